@@ -1,8 +1,9 @@
 """The fork engine: each mutant is a fork of its golden run, made just before the fault is first active.
 
 Results equal the reference engine's byte for byte. The reference engine runs mutants that cannot be forked,
-and reruns those that crash. The `warm` engine forks before the first step. So does this engine if a run stops
-at its first terminal hazard and the golden run has one, too.
+and reruns those that crash, but for crashes of confirmed classes (`crashes_in_forks`). The `warm` engine
+forks before the first step. So does this engine if a run stops at its first terminal hazard and the golden
+run has one, too.
 """
 
 import marshal
@@ -15,17 +16,25 @@ from secrets import token_bytes
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import (
-    disk_full_error,
     raising_disk_full,
     remove_anything_at,
     remove_folder,
 )
 from mutator._common.message_text import counted
+from mutator.engines.authenticated_files import AuthenticatedFiles
 from mutator.engines.code_swap_planning import CodeSwap, plan_swap
-from mutator.engines.engine_jobs import EngineArguments, Job, JobResult, RunMode, harness_error_result
-from mutator.engines.executed_functions import ExecutedFunctions, executed_functions_from_json
+from mutator.engines.crashes_in_forks import CrashClasses, is_same_crash
+from mutator.engines.engine_jobs import (
+    EngineArguments,
+    Job,
+    JobResult,
+    RunMode,
+    harness_error_result,
+)
+from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
-from mutator.engines.fork_messages import SharedParts, check_fork_report, fork_request
+from mutator.engines.fork_messages import SharedParts, fork_request
+from mutator.engines.fork_results import ForkResults
 from mutator.engines.fork_server_processes import (
     ForkServer,
     GoldenRunRequest,
@@ -36,18 +45,15 @@ from mutator.engines.fork_server_processes import (
 from mutator.engines.golden_run_keys import GoldenRunKey, golden_run_id, golden_run_key, resolved_path
 from mutator.engines.job_folder import PLAIN_OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
 from mutator.engines.observation_store import (
-    OBSERVATION_KEYS,
     ObservationStore,
     observations_of_watched_run,
 )
 from mutator.engines.process_endings import (
     GUARD_PATIENCE_S,
     ProcessEnding,
-    exception_in_report,
-    status_of_ending,
-    was_disk_full,
     without_run_specifics,
 )
+from mutator.engines.received_fork_output import ReceivedForkOutput
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import ForkServerLost, MutantNotSwappable, NotForkable
@@ -83,7 +89,11 @@ class ForkEngine:
         self._parent_pid = parent_pid
         self._null_mutant = null_mutant
         self._forks_before_first_step = before_first_step
-        self._observation_store = ObservationStore(self._work_folder, secret or token_bytes(16))
+        secret = secret or token_bytes(16)
+        self._observation_store = ObservationStore(self._work_folder, secret)
+        self._crash_classes = CrashClasses(AuthenticatedFiles(self._work_folder, secret))
+        mode = RunMode.WARM if before_first_step else RunMode.FORK
+        self._results = ForkResults(limits, self._work_folder, mode)
         self._patience_s = limits.wall_s + GUARD_PATIENCE_S
         self._server: ForkServer | None = None
         self._server_count = 0
@@ -112,7 +122,7 @@ class ForkEngine:
         """
         try:
             with raising_disk_full(self._work_folder):
-                return self._execute_by_fork(job, folder)
+                result = self._execute_by_fork(job, folder)
         except (MutantNotSwappable, NotForkable) as why:
             return self._run_on_reference_engine(job, without_run_specifics(str(why), folder))
         except ForkServerLost as why:
@@ -125,6 +135,16 @@ class ForkEngine:
             return self._run_on_reference_engine(
                 job, f"its folders were changed during the run ({err.strerror})"
             )
+        if result.crash_class and not self._crash_classes.is_confirmed(result.crash_class):
+            return self._confirm_crash(job, result)
+        return result
+
+    def _confirm_crash(self, job: Job, of_fork: JobResult) -> JobResult:
+        assert of_fork.exception is not None
+        reason = f"ended as crashed: {of_fork.exception.description_without_place}"
+        result = self._run_on_reference_engine(job, reason)
+        self._crash_classes.note(of_fork.crash_class, is_same=is_same_crash(of_fork, result))
+        return result
 
     def _run_on_reference_engine(self, job: Job, fallback_reason: str) -> JobResult:
         another = self.reference.folder_of_job(job)
@@ -238,9 +258,11 @@ class ForkEngine:
     ) -> JobResult:
         ensure_work_folder(self._work_folder)
         with JobFolder(folder) as home:
-            ended = self._fork_and_wait(waiting, job, home, swap, fork_point, observe)
-            place = self.reference.folder_of_job(job) / PLAIN_OUTPUT_FOLDER
-            return replace(self._result_of_fork(job, home, ended, place, observe), fork_step=fork_point.step)
+            ended, output = self._fork_and_wait(waiting, job, home, swap, fork_point, observe)
+            with output:
+                place = self.reference.folder_of_job(job) / PLAIN_OUTPUT_FOLDER
+                result = self._results.result_of(job, home, ended, output, place, observe=observe)
+            return replace(result, fork_step=fork_point.step)
 
     def _fork_and_wait(
         self,
@@ -250,7 +272,7 @@ class ForkEngine:
         swap: CodeSwap,
         fork_point: ForkPoint,
         observe: bool,
-    ) -> ProcessEnding:
+    ) -> tuple[ProcessEnding, ReceivedForkOutput]:
         request = fork_request(
             self._manifest,
             self._limits,
@@ -271,7 +293,7 @@ class ForkEngine:
         limited_folder = self._runs_folder if self._manifest.sandbox else home.path
         message = {"do": "mutant", "job": marshal.dumps(request), "home": str(limited_folder), **limits}
         with nullcontext() if waiting.key else raising_if_server_input_changes(job.scenario):
-            reply, _ = waiting.send_request(message, self._patience_s)
+            reply, handles = waiting.send_request(message, self._patience_s)
         self._ensure_server(job).clear_sandbox_temporary_folders()
         if reply["threads"]:
             raise NotForkable(
@@ -280,40 +302,12 @@ class ForkEngine:
         if count := reply["processes"]:
             started = f"it has started {counted(count, 'process', 'processes')}, which forks would share"
             raise NotForkable(started, "do the work of other processes in the step itself")
+        output = ReceivedForkOutput(*handles)
         if reply["touched"]:
-            self.close()
+            with output:
+                self.close()
             raise NotForkable("it writes into its own tree")
-        return ProcessEnding(**{name: reply[name] for name in ProcessEnding.__slots__})
-
-    def _result_of_fork(
-        self, job: Job, home: JobFolder, ended: ProcessEnding, output_destination: Path, observe: bool
-    ) -> JobResult:
-        home.unlock()
-        report = home.read_report(threads=list, modules=list)
-        if report is not None:
-            check_fork_report(job, report, is_golden=observe)
-        status, detail = status_of_ending(self._limits, ended, report, job)
-        if status is not Status.OK and was_disk_full(self._work_folder, report):
-            raise disk_full_error(self._work_folder)
-        if status is Status.CRASHED:
-            # a crash's record has its exception, with the place, which only the reference engine reports
-            raised = exception_in_report(report) if report else None
-            raise NotForkable(f"ended as crashed: {raised.description_without_place if raised else detail}")
-        return JobResult(
-            status=status,
-            detail=detail,
-            out=home.move_plain_output(output_destination),
-            probe_report=report["probe"] if report else None,
-            cpu_s=ended.cpu_s,
-            wall_s=ended.wall_s,
-            was_fault_active=home.was_fault_active(),
-            log_tail=home.log_tail(),
-            was_stopped_at_hazard=bool(report and report.get("stopped")),
-            third_party_modules=tuple(report["modules"]) if report else (),
-            executed_functions=executed_functions_from_json(report.get("executed")) if report else None,
-            watch_report={name: report[name] for name in OBSERVATION_KEYS} if observe and report else {},
-            mode=RunMode.WARM if self._forks_before_first_step else RunMode.FORK,
-        )
+        return ProcessEnding(**{name: reply[name] for name in ProcessEnding.__slots__}), output
 
     def _golden_observations(self, job: Job, golden: Path) -> GoldenObservations:
         """Return what a probe observes in a job's golden run; it runs if no check has stored that."""

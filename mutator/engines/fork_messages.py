@@ -57,9 +57,6 @@ def fork_request(
     return {
         "home": str(home.path),
         "out": str(home.output_folder),
-        "log": str(home.log_path),
-        "report": str(home.report_path),
-        "inactive": str(home.inactive_marker),
         "child_activations": str(home.child_activations_path),
         "args": None,
         "cpu_s": limits.cpu_s,

@@ -33,6 +33,7 @@ _MOST_WAITING_PROCESSES = 8  # maximum number of waiting processes, because each
 # steps; a process at most this far behind is advanced, not copied: it is quickly remade
 _LOAD_REMEDY = "run `mutator check --drive`: if the golden run fails, too, no campaign can start"
 _MOST_STEPS_TO_ADVANCE = 100
+_MOST_HANDLES = 2  # in a reply
 _PARENT_CHECK_INTERVAL_S = 0.5  # interval between two checks that the parent is alive
 _START_TIMEOUT_S = 120.0  # to load the target, whose libraries a busy machine imports slowly
 
@@ -98,7 +99,9 @@ class WaitingProcess:
         data = b""
         while len(data) < byte_count:
             try:
-                part, new_handles, _, _ = socket.recv_fds(self._connection, byte_count - len(data), 1)
+                part, new_handles, _, _ = socket.recv_fds(
+                    self._connection, byte_count - len(data), _MOST_HANDLES
+                )
             except TimeoutError:
                 self._wake_processes()
                 if self._parent_pid is not None and os.getppid() != self._parent_pid:

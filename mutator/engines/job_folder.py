@@ -52,9 +52,7 @@ class JobFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.output_folder, self.log_path = path / _OUT_FOLDER, path / _LOG_FILE
-        self.report_path = path / _REPORT_FILE
-        self.inactive_marker = path / _INACTIVE_MARKER  # the first activation deletes it
+        self.output_folder = path / _OUT_FOLDER
         self.child_activations_path = path / _CHILD_ACTIVATIONS_FILE
         self._open_handles = ExitStack()
 
@@ -64,7 +62,6 @@ class JobFolder:
             self._folder_handle = opened.enter_context(open_folder(self.path))
             os.mkdir(_OUT_FOLDER, dir_fd=self._folder_handle)
             self._output_handle = opened.enter_context(open_folder(_OUT_FOLDER, self._folder_handle))
-            os.close(os.open(_INACTIVE_MARKER, os.O_CREAT | os.O_EXCL, 0o644, dir_fd=self._folder_handle))
             self._open_handles = opened.pop_all()
         self._path_by_handle = Path(f"/proc/self/fd/{self._folder_handle}")
         return self
@@ -76,6 +73,32 @@ class JobFolder:
         """Return whether the folder or that of the output is no longer in its place."""
         places = ((self.path, self._folder_handle), (self.output_folder, self._output_handle))
         return not all(_is_path_of_handle(path, handle) for path, handle in places)
+
+    def unlock(self) -> None:
+        """Make the folder readable again, which a run can lock."""
+        os.fchmod(self._folder_handle, 0o700)
+
+    def move_plain_output(self, destination: Path) -> Path:
+        """Move the plain files of the output to the new folder `destination`; return it."""
+        remove_anything_at(destination)
+        destination.mkdir(parents=True)
+        with open_folder(destination) as target:
+            move_plain_files(self._output_handle, target)
+        return destination
+
+
+class ReportingJobFolder(JobFolder):
+    """The folder of a run that leaves its report and log there."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.log_path, self.report_path = path / _LOG_FILE, path / _REPORT_FILE
+        self.inactive_marker = path / _INACTIVE_MARKER  # the first activation deletes it
+
+    def __enter__(self) -> "ReportingJobFolder":
+        super().__enter__()
+        os.close(os.open(_INACTIVE_MARKER, os.O_CREAT | os.O_EXCL, 0o644, dir_fd=self._folder_handle))
+        return self
 
     def read_report(self, **extra_fields: type) -> dict[str, Any] | None:
         """Return the child's report; None if it is missing, incomplete or invalid (`parse_run_report`)."""
@@ -93,18 +116,6 @@ class JobFolder:
         except OSError:
             return True
         return False
-
-    def unlock(self) -> None:
-        """Make the folder readable again, which a run can lock."""
-        os.fchmod(self._folder_handle, 0o700)
-
-    def move_plain_output(self, destination: Path) -> Path:
-        """Move the plain files of the output to the new folder `destination`; return it."""
-        remove_anything_at(destination)
-        destination.mkdir(parents=True)
-        with open_folder(destination) as target:
-            move_plain_files(self._output_handle, target)
-        return destination
 
 
 def _is_path_of_handle(path: Path, handle: int) -> bool:

@@ -147,10 +147,15 @@ def read_log_tail(folder: Path, name: str) -> str:
     """Return the end of a text file that a run wrote; empty if there is none."""
     try:
         with open_below(folder, name) as file:
-            file.seek(max(0, os.fstat(file.fileno()).st_size - _LOG_TAIL_BYTES))
-            return file.read(_LOG_TAIL_BYTES).decode("utf-8", "replace")
+            return log_tail(file.fileno(), os.fstat(file.fileno()).st_size)
     except (OSError, UnsafePath):
         return ""
+
+
+def log_tail(file: int, byte_count: int) -> str:
+    """Return the end of the first bytes of an open text file."""
+    start = max(0, byte_count - _LOG_TAIL_BYTES)
+    return os.pread(file, byte_count - start, start).decode("utf-8", "replace")
 
 
 def parse_run_report(data: bytes, **extra_fields: type) -> dict[str, Any] | None:
@@ -189,6 +194,19 @@ def was_disk_full(work_folder: Path, report: dict[str, Any] | None) -> bool:
     except OSError as err:
         return is_disk_full_error(err)
     return False
+
+
+def exception_without_run_specifics(raised: RaisedException, folder: Path) -> RaisedException:
+    stacks = tuple(
+        tuple((without_run_specifics(path, folder), line, column) for path, line, column in stack)
+        for stack in raised.stacks
+    )
+    return RaisedException(
+        kind=without_run_specifics(raised.kind, folder),
+        message=without_run_specifics(raised.message, folder),
+        stacks=stacks,
+        place=without_run_specifics(raised.place, folder),
+    )
 
 
 def without_run_specifics(detail: str, folder: Path) -> str:

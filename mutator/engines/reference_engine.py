@@ -19,12 +19,16 @@ from mutator.engines.engine_jobs import (
     EngineArguments,
     Job,
     JobResult,
-    RaisedException,
     RunMode,
     harness_error_result,
 )
 from mutator.engines.executed_functions import executed_functions_from_json
-from mutator.engines.job_folder import PLAIN_OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
+from mutator.engines.job_folder import (
+    PLAIN_OUTPUT_FOLDER,
+    ReportingJobFolder,
+    can_be_disturbance,
+    ensure_work_folder,
+)
 from mutator.engines.job_tree_pool import JobTreePool
 from mutator.engines.process_endings import (
     GUARD_LOST,
@@ -33,6 +37,7 @@ from mutator.engines.process_endings import (
     check_own_limits_suffice,
     environment_variables_of_run,
     exception_in_report,
+    exception_without_run_specifics,
     status_of_ending,
     wait_for_guard,
     was_disk_full,
@@ -120,12 +125,14 @@ class ReferenceEngine:
         With `fresh_tree`, the job gets a tree of its own, without bytecode.
         """
         ensure_work_folder(self.work_folder)
-        with JobFolder(folder) as home:
+        with ReportingJobFolder(folder) as home:
             ended, changed_input = self._run_in_folder(job, home, fresh_tree=fresh_tree)
             was_moved = home.was_moved()
             return self._result_of_run(job, home, ended, changed_input), bool(changed_input) or was_moved
 
-    def _run_in_folder(self, job: Job, home: JobFolder, *, fresh_tree: bool) -> tuple[ProcessEnding, str]:
+    def _run_in_folder(
+        self, job: Job, home: ReportingJobFolder, *, fresh_tree: bool
+    ) -> tuple[ProcessEnding, str]:
         """Run a job; return how it ended, and a file of its input that was changed meanwhile (or nothing)."""
         folder = home.path
         tree = self._tree_pool.lay_out_tree(folder / "tree", job.changed_files, fresh=fresh_tree)
@@ -141,7 +148,7 @@ class ReferenceEngine:
         return ended, changed_input
 
     def _result_of_run(
-        self, job: Job, home: JobFolder, ended: ProcessEnding, changed_input: str
+        self, job: Job, home: ReportingJobFolder, ended: ProcessEnding, changed_input: str
     ) -> JobResult:
         home.unlock()
         report = home.read_report(files=dict, modules=list)
@@ -156,7 +163,7 @@ class ReferenceEngine:
             probe_report=report["probe"] if report else None,
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
-            exception=raised and _exception_without_run_specifics(raised, home.path),
+            exception=raised and exception_without_run_specifics(raised, home.path),
             was_fault_active=home.was_fault_active(),
             log_tail=home.log_tail(),
             was_stopped_at_hazard=bool(report and report.get("stopped")),
@@ -168,7 +175,7 @@ class ReferenceEngine:
             reach_report=report.get("reach", {}) if report else {},
         )
 
-    def _job_request(self, job: Job, home: JobFolder) -> dict[str, Any]:
+    def _job_request(self, job: Job, home: ReportingJobFolder) -> dict[str, Any]:
         arguments = self.manifest.run_arguments(
             scenario=job.scenario.resolve(),
             seed=job.seed,
@@ -212,7 +219,7 @@ class ReferenceEngine:
         holder, _ = probe_attributes_after(0, None, None)
         return holder, [value.name for value in self.manifest.observation.values]
 
-    def _run_guarded(self, job: Job, request_path: Path, home: JobFolder) -> ProcessEnding:
+    def _run_guarded(self, job: Job, request_path: Path, home: ReportingJobFolder) -> ProcessEnding:
         """Run the job in a guarded process. Process and guard end when the connection is closed."""
         began, folder = time.monotonic(), home.path
         harness_socket, guard_socket = socket.socketpair()
@@ -299,19 +306,6 @@ class ReferenceEngine:
 
 def _describe_changed_input(changed_input: str) -> str:
     return f"{changed_input} was changed while it was in use"
-
-
-def _exception_without_run_specifics(raised: RaisedException, folder: Path) -> RaisedException:
-    stacks = tuple(
-        tuple((without_run_specifics(path, folder), line, column) for path, line, column in stack)
-        for stack in raised.stacks
-    )
-    return RaisedException(
-        kind=without_run_specifics(raised.kind, folder),
-        message=without_run_specifics(raised.message, folder),
-        stacks=stacks,
-        place=without_run_specifics(raised.place, folder),
-    )
 
 
 def make_reference_engine(arguments: EngineArguments) -> ReferenceEngine:

@@ -7,6 +7,7 @@ import ast
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 from mutator.config.location_syntax import PROBE_MODULE_NAME
@@ -140,6 +141,13 @@ def target_line_of(mutated: bytes, line: int, ids_before_anchor: Collection[str]
     last = tags[-1] if tags else None
     is_above_anchor = last and last.replaced_line is None and last.id in ids_before_anchor
     return max(1, target_lines + bool(is_above_anchor))
+
+
+def mutated_line_of(mutated: bytes, target_line: int) -> int:
+    """Return the line in the mutated file of a line of the target's own file, both from 1."""
+    lines = enumerate(mutated.splitlines(), start=1)
+    line_numbers = (n for n, text in lines if (tag := tag_of(text)) is None or tag.replaced_line is not None)
+    return next(islice(line_numbers, target_line - 1, None), target_line)
 
 
 def place_in_target(

@@ -35,6 +35,10 @@ def fail():
     raise ValueError("no such gap")
 
 
+def open_nothing():
+    open("/no/such/file")
+
+
 def leave():
     sys.exit(3)
 

@@ -12,7 +12,6 @@ import gc
 import importlib
 import importlib.util
 import io
-import json
 import marshal
 import operator
 import os
@@ -35,6 +34,8 @@ mutant_installation, thread_names = (
 )
 early_stop = run_once.load_neighbour("early_stop")
 function_recorder = run_once.load_neighbour("function_recorder")
+fork_output = run_once.load_neighbour("fork_output")
+crash_description = run_once.load_neighbour("crash_description")
 
 
 def main(connection_fd: int, start_file: str) -> int:
@@ -92,9 +93,9 @@ class ForkingProcess:
         self.step = 0
         self.function_recorder = function_recorder.FunctionRecorder(start_message["tree"])
 
-    def send_reply(self, reply: dict[str, Any], handle: int | None = None) -> None:
+    def send_reply(self, reply: dict[str, Any], *handles: int) -> None:
         data = marshal.dumps(reply)
-        more = [] if handle is None else [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [handle]))]
+        more = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", handles))] if handles else []
         self.connection.sendmsg([struct.pack("<I", len(data))], more)
         self.connection.sendall(data)
 
@@ -179,8 +180,8 @@ class ForkingProcess:
         gc.freeze()
         return {"threads": thread_names.other_thread_names()}
 
-    def fork_mutant(self, job: bytes, home: str, wall_s: float, disk_mb: int) -> dict[str, Any]:
-        """Fork and guard a child that continues as a mutant; return how it ended.
+    def fork_mutant(self, job: bytes, home: str, wall_s: float, disk_mb: int) -> dict[str, Any] | None:
+        """Fork and guard a child that continues as a mutant; reply how it ended, with its report and log.
 
         Only the child unmarshals the job, because memory that this process writes to must be copied after
         each fork.
@@ -189,40 +190,46 @@ class ForkingProcess:
             return {"threads": others, "processes": 0}
         if processes := self.count_run_processes():
             return {"threads": [], "processes": processes}
-        space_limit = process_guard.DiskGrowthLimit(home, disk_mb)
+        output = fork_output.ForkOutput()
+        space_limit = process_guard.DiskGrowthLimit(home, disk_mb, (output.log, output.report))
         self.loaded_files.update()
         prepare_to_fork()
         ending = process_guard.fork_guarded(self.connection.fileno(), wall_s=wall_s, space_limit=space_limit)
         if ending is None:
-            self.become_mutant(marshal.loads(job))
+            self.become_mutant(marshal.loads(job), output)
         if ending["stopped"] == process_guard.ABANDONED:
             raise NoLongerNeeded
-        return {**ending, "threads": [], "processes": 0, "touched": self.was_tree_changed()}
+        reply = {**ending, "threads": [], "processes": 0, "touched": self.was_tree_changed()}
+        self.send_reply(reply, output.report, output.log)
+        output.close()
+        return None
 
     def count_run_processes(self) -> int:
         """Count the processes that the golden run has started, which its forks would share."""
         children = set(process_guard.child_pids(os.getpid())) - self.waiting_children
         return self.inherited_processes + len(children)
 
-    def become_mutant(self, job: dict[str, Any]) -> NoReturn:
+    def become_mutant(self, job: dict[str, Any], output: Any) -> NoReturn:
         """In a new child: continue the run to its end as a mutant, and report."""
         self.connection.close()
-        log = os.open(job["log"], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
-        os.dup2(log, 1)
-        os.dup2(log, 2)
-        os.close(log)
+        output.print_to_log()
         self.use_temporary_folder(job["home"])
         run_once.limit_resources(job)
         os.chdir(job["out"])
-        report = self.run_mutant_to_end(job)
+        report = self.run_mutant_to_end(job, output)
         imported_modules = run_once.modules_imported_since(job["probe_name"])
         report["outside"] = self.files_outside_tree + self.files_imported_elsewhere(imported_modules)
         report["modules"] = run_once.third_party_names(imported_modules, self.start_message["packages"])
         report["threads"] = thread_names.other_thread_names()
-        Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
+        output.write_report(report)
         if job["watch"] is None or not report["threads"]:  # a golden run with other threads is not used
             run_exit_handlers_and_flush()
         os._exit(0)
+
+    def describe_crash(self, err: BaseException, new_codes: list[Any]) -> Any:
+        errors = run_once.exception_chain(err)
+        frames = [run_once.tree_frames(error, self.start_message["tree"]) for error in errors]
+        return crash_description.describe_crash(errors, frames, new_codes)
 
     def with_shared_parts(self, parts: list[Any]) -> list[Any]:
         """Return parts of a job, with those in the place of numbers that the server got when it started."""
@@ -247,17 +254,19 @@ class ForkingProcess:
         except OSError:
             return True
 
-    def run_mutant_to_end(self, job: dict[str, Any]) -> dict[str, Any]:
+    def run_mutant_to_end(self, job: dict[str, Any], output: Any) -> dict[str, Any]:
         report: dict[str, Any] = {"ended": "ok", "error": None, "disk_full": False, "probe": None}
         watch = job["watch"]
         probe, modules_before = None, set() if watch is None else set(sys.modules)
+        functions: list[Any] = []
+        is_driving = False
         try:
             probe = mutant_installation.install_probe(job["probe_name"], self.with_shared_parts(job["probe"]))
             functions = self.with_shared_parts(job["functions"])
             mutant_installation.swap_code(functions, probe, self.loaded_files)
             mutant_installation.run_probe_value_setters(job["settings"], probe)
             probe.limit(job["steps"])
-            run_once.delete_marker_on_activation(probe, job["inactive"])
+            run_once.call_at_first_activation(probe, output.note_activation)
             run_once.child_activations.count_in_children(probe, job["child_activations"])
             # give the probe the state that it would have if it had observed from the start
             holder, state = job["probe_state"]
@@ -272,9 +281,10 @@ class ForkingProcess:
                     "seen": observations,
                     "before": mutant_installation.run_counting_observations(run, observations),
                 }
+            is_driving = True
             report["stopped"] = early_stop.drive_run(run, job["stop"])
+            is_driving = False
             run.write(Path(job["out"]))
-            report["executed"] = self.function_recorder.as_json()
             if observations is not None:
                 report["libraries"] = run_once.new_modules_outside_packages(
                     modules_before, self.start_message["packages"]
@@ -283,6 +293,9 @@ class ForkingProcess:
             report |= {"ended": "swap refused", "why": str(why)}
         except BaseException as err:
             report |= run_once.describe_failure(err, self.start_message["tree"], job["probe_name"])
+            if is_driving:
+                report["crash"] = self.describe_crash(err, [new for _, _, _, new in functions])
+        report["executed"] = self.function_recorder.as_json()
         if probe is not None:
             report |= run_once.collect_probe_report(probe, self.start_message["tree"], job["probe_name"])
             run_once.child_activations.add_children(report["probe"], job["child_activations"])

@@ -13,7 +13,7 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -38,16 +38,22 @@ _libc = ctypes.CDLL(None)
 class DiskGrowthLimit:
     """A limit on how much the folder `home` can grow: `disk_mb` MiB.
 
-    The folder is held open, because a run can rename it and put a link to a large one in its place.
+    The folder is held open, because a run can rename it and put a link to a large one in its place. What the
+    `open_files` outside of it take counts, too.
     """
 
-    def __init__(self, home: str, disk_mb: int) -> None:
+    def __init__(self, home: str, disk_mb: int, open_files: Sequence[int] = ()) -> None:
         self._handle = os.open(home, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
         self._home = f"/proc/self/fd/{self._handle}"
-        self._most_bytes = disk_usage_bytes(self._home) + (disk_mb << 20)
+        self._open_files = open_files
+        self._most_bytes = self._used_bytes() + (disk_mb << 20)
 
     def is_used_up(self) -> bool:
-        return disk_usage_bytes(self._home) >= self._most_bytes
+        return self._used_bytes() >= self._most_bytes
+
+    def _used_bytes(self) -> int:
+        files = sum(os.fstat(file).st_blocks * _BLOCK_BYTES for file in self._open_files)
+        return disk_usage_bytes(self._home) + files
 
     def close(self) -> None:
         os.close(self._handle)

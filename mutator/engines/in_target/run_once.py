@@ -18,7 +18,7 @@ import runpy
 import sys
 import time
 import types
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -110,7 +110,7 @@ def run_job(job: dict[str, Any]) -> None:
                 watch = load_neighbour("reach_watch").ReachWatcher
                 reach_watcher = watch(probe, job["tree"], job["watched_places"])
                 reach_watcher.begin()
-            delete_marker_on_activation(probe, job["inactive"])
+            call_at_first_activation(probe, Path(job["inactive"]).unlink)
             child_activations.count_in_children(probe, job["child_activations"])
         if probe and job["observe"]:
             observations = load_neighbour("mutant_installation").keep_observations(probe, *job["observe"])
@@ -192,8 +192,8 @@ def run_to_terminal_hazard(job: dict[str, Any]) -> bool:
     return stopped
 
 
-def delete_marker_on_activation(probe: Any, inactive_marker: str) -> None:
-    """Delete `inactive_marker` at the first activation, which is then known even if the run crashes."""
+def call_at_first_activation(probe: Any, note: Callable[[], None]) -> None:
+    """Call `note` at the first activation, which is then known even if the run crashes."""
     active = probe.active
 
     def first_active(fi: str) -> Any:
@@ -201,7 +201,7 @@ def delete_marker_on_activation(probe: Any, inactive_marker: str) -> None:
         if acts:
             probe.active = active
             with suppress(OSError):
-                Path(inactive_marker).unlink()
+                note()
         return acts
 
     probe.active = first_active
@@ -265,18 +265,28 @@ def exception_chain(err: BaseException) -> list[BaseException]:
 
 
 def tree_stack(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
-    """Return where the exception passed through the tree: file, line and column, innermost first."""
+    """Return where the exception passed through the tree: file, line and column, innermost first, each line
+    once.
+    """
+    innermost_by_line: dict[tuple[str, int], tuple[str, int, int]] = {}
+    for file, line, column, _ in tree_frames(err, tree):
+        innermost_by_line.setdefault((file, line), (file, line, column))
+    return list(innermost_by_line.values())
+
+
+def tree_frames(err: BaseException, tree: str) -> list[tuple[str, int, int, types.CodeType]]:
+    """Return file, line, column and code of each frame in the tree that the exception left, innermost
+    first.
+    """
     frames = []
     trace = err.__traceback__
     while trace is not None:
-        file = trace.tb_frame.f_code.co_filename
-        if file.startswith(tree + os.sep):
-            frames.append((os.path.relpath(file, tree), trace.tb_lineno or 0, failing_byte_column(trace)))
+        code = trace.tb_frame.f_code
+        if code.co_filename.startswith(tree + os.sep):
+            file = os.path.relpath(code.co_filename, tree)
+            frames.append((file, trace.tb_lineno or 0, failing_byte_column(trace), code))
         trace = trace.tb_next
-    innermost_by_line: dict[tuple[str, int], tuple[str, int, int]] = {}
-    for frame in reversed(frames):
-        innermost_by_line.setdefault(frame[:2], frame)
-    return list(innermost_by_line.values())
+    return frames[::-1]
 
 
 def failing_byte_column(trace: types.TracebackType) -> int:

@@ -90,3 +90,13 @@ def test_each_line_of_a_mutant_has_a_line_in_the_targets_file() -> None:
     ]
     below = [injected_line_syntax.target_line_of(MUTATED, line, ("aaaaaaaa", "bbbbbbbb")) for line in lines]
     assert below == [1, 1, 1, 2, 3, 3, 3, 3, 4]
+
+
+def test_lines_of_the_target_are_found_in_the_mutated_file() -> None:
+    """Also below injected lines, and where one replaces the target's line."""
+    guard = injected_line_syntax.tagged_line('if _fi.active("0a1b2c3d"):', "0a1b2c3d", 1).encode()
+    replaced = b"x = 3" + injected_line_syntax.replacement_tag(["0a1b2c3d"], b"x = 2")
+    mutated = b"\n".join([guard, b"    x = 1", b"y = 1", replaced, guard, b"    z = 1", b""])
+    lines = [injected_line_syntax.mutated_line_of(mutated, line) for line in range(1, 5)]
+    assert lines == [2, 3, 4, 6]
+    assert [injected_line_syntax.target_line_of(mutated, line) for line in lines] == [1, 2, 3, 4]

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from mutator.engines.in_target.run_once import (
+    call_at_first_activation,
     collect_probe_report,
-    delete_marker_on_activation,
     describe_failure,
     modules_imported_since,
 )
@@ -164,13 +164,13 @@ def test_a_full_disk_in_an_exception_group_is_recognized(described: Callable[...
     assert not described("unspeakable")["disk_full"]
 
 
-def test_the_first_activation_deletes_a_file(tmp_path: Path) -> None:
+def test_the_first_activation_is_noted_once(tmp_path: Path) -> None:
     inactive = tmp_path / "inactive"
     inactive.touch()
     answers = [False, False, True, False]
     original = lambda fi: answers.pop(0)  # noqa: E731
     probe = types.SimpleNamespace(active=original)
-    delete_marker_on_activation(probe, str(inactive))
+    call_at_first_activation(probe, inactive.unlink)
     for active, there in ((False, True), (False, True), (True, False)):
         assert probe.active("a") is active
         assert inactive.exists() is there
