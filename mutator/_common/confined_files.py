@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from mutator._common.bounded_reading import read_open_file
-from mutator._common.files import make_accessible, raising_disk_full, remove_anything_at
+from mutator._common.files import open_accessible_folder, raising_disk_full, remove_anything_at
 from mutator.errors import MutatorError, UnsafePath
 
 # The kernel refuses a link (O_NOFOLLOW), so that nothing can be exchanged between a look and the opening.
@@ -222,9 +222,7 @@ def move_plain_files(source_fd: int, target_fd: int, depth: int = 0) -> None:
 @contextmanager
 def open_folder(name: str | Path, parent: int | None = None) -> Iterator[int]:
     """Yield a descriptor of a folder; NotADirectoryError for anything else, also for a link."""
-    with suppress(OSError):
-        make_accessible(name, parent)
-    handle = os.open(name, _OPEN_FOLDER_FLAGS, dir_fd=parent)
+    handle = open_accessible_folder(name, parent)
     try:
         yield handle
     finally:

@@ -105,7 +105,7 @@ def remove_folder(path: Path) -> None:
     if path.is_symlink():
         return
     with suppress(OSError):
-        here = _open_folder(str(path))
+        here = open_accessible_folder(str(path))
         stack = [
             ("", _delete_files_and_list_folders(here), _folder_identity(here))
         ]  # folders on the way down, with remaining subfolders
@@ -115,7 +115,7 @@ def remove_folder(path: Path) -> None:
                 if subfolders:
                     with suppress(OSError):
                         below = subfolders.pop()
-                        here = _swap_descriptor(here, _open_folder(below, here))
+                        here = _swap_descriptor(here, open_accessible_folder(below, here))
                         stack.append((below, _delete_files_and_list_folders(here), _folder_identity(here)))
                     continue
                 stack.pop()
@@ -151,10 +151,20 @@ class ScratchFolder:
         self._end()
 
 
-def _open_folder(name: str, parent: int | None = None) -> int:
-    with suppress(OSError):
+def open_accessible_folder(name: str | Path, parent: int | None = None) -> int:
+    """Return a descriptor of a folder that this user can list and change, as far as permissions allow.
+
+    NotADirectoryError for anything else, also for a link.
+    """
+    try:
+        folder = os.open(name, _OPEN_FOLDER_FLAGS, dir_fd=parent)
+    except PermissionError:
         make_accessible(name, parent)
-    return os.open(name, _OPEN_FOLDER_FLAGS, dir_fd=parent)
+        return os.open(name, _OPEN_FOLDER_FLAGS, dir_fd=parent)
+    if os.fstat(folder).st_mode & stat.S_IRWXU != stat.S_IRWXU:
+        with suppress(OSError):
+            os.fchmod(folder, stat.S_IRWXU)
+    return folder
 
 
 def make_accessible(name: str | Path, parent: int | None = None) -> None:

@@ -77,15 +77,13 @@ def _cached_fork_point(
         return None
     step = observations.step_of_observation(int(active_observations[0]))
     observation_count = observations.counts_before_steps[step]
-    times = observations.columns[
-        0, :observation_count
-    ].tolist()  # `min`, because time starts again if the run restarts
-    last = times[-1] if observation_count else None
+    times = observations.columns[0, :observation_count]
     return ForkPoint(
         step=step,
         observation_count=observation_count,
-        earliest_time_s=min(times, default=None),
-        last_time_s=last,
+        # the lowest one, because time starts again if the run restarts
+        earliest_time_s=float(times.min()) if observation_count else None,
+        last_time_s=float(times[-1]) if observation_count else None,
     )
 
 

@@ -57,10 +57,10 @@ class JobFolder:
         self._open_handles = ExitStack()
 
     def __enter__(self) -> "JobFolder":
-        self.path.mkdir(parents=True, exist_ok=True)
+        self.path.mkdir(stat.S_IRWXU, parents=True, exist_ok=True)
         with ExitStack() as opened:
             self._folder_handle = opened.enter_context(open_folder(self.path))
-            os.mkdir(_OUT_FOLDER, dir_fd=self._folder_handle)
+            os.mkdir(_OUT_FOLDER, stat.S_IRWXU, dir_fd=self._folder_handle)
             self._output_handle = opened.enter_context(open_folder(_OUT_FOLDER, self._folder_handle))
             self._open_handles = opened.pop_all()
         self._path_by_handle = Path(f"/proc/self/fd/{self._folder_handle}")

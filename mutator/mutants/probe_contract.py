@@ -73,16 +73,21 @@ class ProbeSource:
 
         Blank lines keep the line numbers unchanged.
         """
-        pairs = list(zip(self.settings_parts, self.code_parts, strict=True))
+        pairs = zip(self.settings_parts, self.code_parts, strict=True)
         padded_settings = (settings + "\n" * code.count("\n") for settings, code in pairs)
-        return "".join(padded_settings), "".join(
-            "\n" * settings.count("\n") + code for settings, code in pairs
-        )
+        lines_before_parts = tuple(settings.count("\n") for settings in self.settings_parts)
+        return "".join(padded_settings), _padded_code(self.code_parts, lines_before_parts)
 
     @property
     def armed_condition(self) -> tuple[float, str]:
         """The time (s) from which it is armed, and the source of its condition on observed values."""
         return self.armed_after_s - _time_tolerance_s(self.code_parts), self.settings_parts[-1]
+
+
+@lru_cache(maxsize=64)  # all mutants of a target share a few
+def _padded_code(code_parts: tuple[str, ...], lines_before_parts: tuple[int, ...]) -> str:
+    pairs = zip(lines_before_parts, code_parts, strict=True)
+    return "".join("\n" * lines + code for lines, code in pairs)
 
 
 def probe_path(package: str | None) -> str:
