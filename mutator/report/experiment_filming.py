@@ -13,6 +13,7 @@ from pathlib import Path
 from mutator._common.confined_files import open_below, path_below
 from mutator._common.files import ScratchFolder, make_folder, writing_temporary_path
 from mutator.engines import pyc_files
+from mutator.engines.in_target import process_guard
 from mutator.engines.process_endings import environment_variables_of_run
 from mutator.engines.run_limits import limits_before_measuring
 from mutator.engines.sandbox import Sandbox
@@ -26,6 +27,7 @@ from mutator.targets.manifest import FILM_FOLDER, TargetManifest
 from mutator.workspace import Workspace
 
 EVENTS_SCHEMA = "film-events/1"
+_SCRIPT = Path(process_guard.__file__).with_name("run_module_in_turn.py")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,8 +102,7 @@ class ExperimentFilmer:
                 "faulty": str(single.faulty / FILM_FOLDER),
                 "events": str(events),
             }
-            for shot in shots:
-                _write_shot(self.target, scratch, film_paths, shot)
+            _write_shots(self.target, scratch, film_paths, shots)
         return is_same_record(self.folder, stored_record, record)
 
 
@@ -135,40 +136,52 @@ def _film_events(record: Record, title: str, names: Mapping[str, str]) -> dict[s
     }
 
 
-def _write_shot(manifest: TargetManifest, folder: Path, film_paths: Mapping[str, str], shot: Shot) -> None:
-    """Write one file with the target's command."""
+def _write_shots(
+    manifest: TargetManifest, folder: Path, film_paths: Mapping[str, str], shots: Sequence[Shot]
+) -> None:
+    """Write files with the target's command, all in one process."""
     film = manifest.film
     assert film is not None  # callers checked this
     tree = manifest.root
     if manifest.overlay is not None:
         tree = folder / "tree"
         pyc_files.replace_dropping_bytecode(manifest.tree.files, tree)
-    out, scratch_file = shot.path.absolute(), path_below(folder / "shown", shot.path.name)
-    placeholders = {**film_paths, "out": str(scratch_file), "t": str(shot.t)}
-    for place in (out, scratch_file):
-        make_folder(place.parent)
-    arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
+    scratch_folder, argument_lists = folder / "shown", []
+    make_folder(scratch_folder)
+    scratch_files = [path_below(scratch_folder, f"{n}{shot.path.suffix}") for n, shot in enumerate(shots)]
+    for shot, scratch_file in zip(shots, scratch_files, strict=True):
+        make_folder(shot.path.absolute().parent)
+        arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
+        placeholders = {**film_paths, "out": str(scratch_file), "t": str(shot.t)}
+        argument_lists.append(list(fill_placeholders(arguments, placeholders)))
     # -P and -s: neither the current folder nor the user's packages can replace a module of the target
-    command = [sys.executable, "-P", "-s", "-m", film.module, *fill_placeholders(arguments, placeholders)]
+    script = (str(_SCRIPT), film.module, json.dumps(argument_lists))
+    command = [sys.executable, "-P", "-s", *script]
     films = (Path(film_paths["golden"]), Path(film_paths["faulty"]))
     if sandbox := Sandbox.of_target(manifest, folder, [*films, tree]):
         command = sandbox.wrap_command(command)
         sandbox.close()
     process = subprocess.run(
         command,
-        cwd=scratch_file.parent,
+        cwd=scratch_folder,
         env={**environment_variables_of_run(0, folder, manifest.env), "PYTHONPATH": str(tree)},
         capture_output=True,
         text=True,
         check=False,
     )
-    if process.returncode != 0 or not scratch_file.is_file():
-        error_lines = process.stderr.strip().splitlines() or ["no message"]
-        complaint = error_lines[-1].removeprefix("error: ").replace(str(scratch_file), str(out))
-        raise MutatorError(complaint, where=f"{film.module}")
+    for shot, scratch_file in zip(shots, scratch_files, strict=True):
+        if not scratch_file.is_file() or (process.returncode and shot is shots[-1]):
+            error_lines = process.stderr.strip().splitlines() or ["no message"]
+            complaint = error_lines[-1].removeprefix("error: ")
+            complaint = complaint.replace(str(scratch_file), str(shot.path.absolute()))
+            raise MutatorError(complaint, where=f"{film.module}")
+        _copy_plain_file(scratch_file, shot.path.absolute())
+
+
+def _copy_plain_file(source_path: Path, out: Path) -> None:
     # copying can be interrupted, and the command can leave a link
     with (
-        open_below(scratch_file.parent, scratch_file.name) as source,
+        open_below(source_path.parent, source_path.name) as source,
         writing_temporary_path(out) as half,
         half.open("wb") as target,
     ):

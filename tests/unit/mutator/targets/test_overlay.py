@@ -11,7 +11,7 @@ from mutator.errors import MutatorError
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Outcome
 from mutator.mutants.mutant_building import build
-from mutator.report.experiment_filming import Shot, _write_shot
+from mutator.report.experiment_filming import Shot, _write_shots
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
@@ -132,5 +132,5 @@ def test_the_film_command_has_the_overlay_and_the_root_in_one_folder(pole: Works
     manifest.write_text(manifest.read_text() + film)
     shot = Shot(path=tmp_path / "out.txt")
     films = dict.fromkeys(("golden", "faulty"), str(tmp_path))
-    _write_shot(pole.manifest("pole"), tmp_path / "scratch", films, shot)
+    _write_shots(pole.manifest("pole"), tmp_path / "scratch", films, [shot])
     assert shot.path.read_text() == str(tmp_path / "scratch" / "tree" / "drive.py")

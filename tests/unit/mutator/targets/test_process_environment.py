@@ -7,7 +7,7 @@ import pytest
 from mutator.engines.engine_jobs import RunMode
 from mutator.errors import MutatorError
 from mutator.model import Status
-from mutator.report.experiment_filming import Shot, _write_shot
+from mutator.report.experiment_filming import Shot, _write_shots
 from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
@@ -39,7 +39,7 @@ def test_films_have_the_variables(toycar: Workspace, tmp_path: Path) -> None:
     show = toycar.library.parent / "tree" / "toycar" / "show.py"
     show.write_text("import os, sys; open(sys.argv[4], 'w').write(os.environ['ROAD'])")
     places = dict.fromkeys(("golden", "faulty", "events"), "")
-    _write_shot(toycar.manifest("toycar"), tmp_path, places, Shot(path=tmp_path / "film.txt"))
+    _write_shots(toycar.manifest("toycar"), tmp_path, places, [Shot(path=tmp_path / "film.txt")])
     assert (tmp_path / "film.txt").read_text() == "wet"
 
 
