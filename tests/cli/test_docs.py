@@ -283,6 +283,8 @@ def test_the_readme_has_both_command_lines() -> None:
         (True, False),
         (False, True),
     ]
+    [with_uv] = [line for line in README.read_text().splitlines() if line.startswith("uv venv ")]
+    assert with_uv == lines[0].replace("python3 -m venv", "uv venv").replace(".venv/bin/pip", "uv pip")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)

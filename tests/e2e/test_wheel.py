@@ -131,6 +131,17 @@ def test_the_wheel_contains_only_the_package_its_data_and_the_archive(wheel: Pat
     assert all((CLONE / name).read_bytes() == data for name, data in shipped.items())
 
 
+def test_the_readmes_line_with_uv_installs_the_program(clone: Path, tmp_path: Path) -> None:
+    call(sys.executable, "-m", "venv", tmp_path / "tool", here=clone)
+    call(tmp_path / "tool" / "bin" / "python", "-m", "pip", "install", "uv", here=clone)
+    lines = (clone / "README.md").read_text(encoding="utf-8").splitlines()
+    [line] = [line for line in lines if line.startswith("uv venv ")]
+    install, _, run = line.rpartition(" && ")
+    assert run.startswith(".venv/bin/mutator run quickstart")
+    path = f"{tmp_path / 'tool' / 'bin'}:{os.environ['PATH']}"
+    call("env", f"PATH={path}", "sh", "-c", f"{install} && .venv/bin/mutator list scenarios", here=clone)
+
+
 def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhere: Path) -> None:
     code = "import importlib.util; print(importlib.util.find_spec('selfdrive'))"
     assert call(python, "-c", code, here=elsewhere) == "None\n"
