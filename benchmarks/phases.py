@@ -55,6 +55,7 @@ class ProcessTree:
         children: dict[int, list[int]] = defaultdict(list)
         times: dict[int, tuple[float, float]] = {}
         parents: dict[int, int] = {}
+        leaders: set[int] = set()  # of sessions
         for path in Path("/proc").glob("[0-9]*/stat"):
             try:
                 fields = path.read_text().rpartition(")")[2].split()
@@ -63,6 +64,8 @@ class ProcessTree:
             pid, ticks = int(path.parent.name), [int(field) for field in fields[11:15]]
             children[int(fields[1])].append(pid)
             parents[pid] = int(fields[1])
+            if int(fields[3]) == pid:
+                leaders.add(pid)
             times[pid] = (TICK_S * sum(ticks[:2]), TICK_S * sum(ticks[2:]))
         self._alive = set(times)
         todo, total = [self._root], 0.0
@@ -71,10 +74,12 @@ class ProcessTree:
             todo += children[pid]
             if pid in times:
                 total += sum(times[pid])
-                self._note(pid, parents[pid], *times[pid])
+                self._note(pid, parents[pid], pid in leaders, *times[pid])
         self._total_s = max(self._total_s, total)
 
-    def _note(self, pid: int, parent: int, own_s: float, ended_children_s: float) -> None:
+    def _note(
+        self, pid: int, parent: int, leads_session: bool, own_s: float, ended_children_s: float
+    ) -> None:
         try:
             words = Path(f"/proc/{pid}/cmdline").read_text()
         except OSError:
@@ -82,7 +87,10 @@ class ProcessTree:
         if pid == self._root:
             self._command_s = own_s
         elif "fork_server.py" in words:
-            self._fork_servers[pid], self._parents[pid] = (own_s, ended_children_s), parent
+            # a forked run leads a session, as do the guard and the first process of its server
+            is_forked_run = leads_session and self._parents.get(parent) in self._fork_servers
+            if not is_forked_run:
+                self._fork_servers[pid], self._parents[pid] = (own_s, ended_children_s), parent
         elif "run_once.py" not in words:
             self._workers[pid] = own_s
 
