@@ -67,7 +67,7 @@ def masked(experiment: Experiment) -> Record:
 
 
 def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
-    looked_at = preflight_checks._PreflightChecks(workspace, folder, b"")
+    looked_at = preflight_checks.PreflightChecks(workspace, folder, b"")
     goldens = {}
     for one in looked_at.golden_runs:
         key = one.key

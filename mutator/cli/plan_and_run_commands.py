@@ -358,7 +358,12 @@ def _print_results(terminal: Terminal, run: "Run", summary: "Summary") -> None:
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now; "
         f"checks, experiments and proof took {describe_duration(summary.elapsed_s)}"
     )
-    for note in (summary.reuse_note, summary.since_note, summary.selection_note):
+    for note in (
+        summary.provisional_note,
+        summary.reuse_note,
+        summary.since_note,
+        summary.selection_note,
+    ):
         if note:
             terminal.print_text(note)
     if summary.proof_note:

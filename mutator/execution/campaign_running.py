@@ -64,7 +64,9 @@ def run_campaign(
         last_failed=last_failed,
         notify=notify,
     ) as session:
-        session.prepare(packages_of_distributor(distributor))
+        session.prepare(
+            packages_of_distributor(distributor), checks_beside=isinstance(distributor, LocalDistributor)
+        )
         if session.pending or session.proof:
             stray_files = StrayFiles()
             with reporting_progress(session):

@@ -55,11 +55,11 @@ class CodeRecording:
         # a worker of a bench can begin long after its session, when somebody has edited the harness
         self._is_in_use = assignment.surroundings[HARNESS_NAME] == digest(harness_digest())
         self._tree = manifest.tree
-        self._packages = LoadedPackages(folder, assignment.version_by_package)
+        self.packages = LoadedPackages(folder, assignment.version_by_package)
 
     def note_new_goldens(self) -> None:
         """Note that the run folder has more golden runs."""
-        self._packages.note_new_goldens()
+        self.packages.note_new_goldens()
 
     def code_of(self, finished: RecordedExperiment) -> ExecutedCode | None:
         """Return what an experiment's run executed; None if nothing ran, or if nothing was noted."""
@@ -68,7 +68,7 @@ class CodeRecording:
             return None
         obstacle = executed.obstacle
         if packages is None:
-            packages = self._packages.versions(finished.third_party_modules, mutant)
+            packages = self.packages.versions(finished.third_party_modules, mutant)
         if packages is None:
             packages, obstacle = {}, "it loaded a package whose code can change"
         return ExecutedCode(
@@ -88,7 +88,7 @@ class CodeRecording:
         for name, value in self._surroundings.items():
             if code.surroundings.get(name) != value:
                 return f"{name} changed"
-        return "" if self._packages.have_versions(code.packages) else "a package that they loaded changed"
+        return "" if self.packages.have_versions(code.packages) else "a package that they loaded changed"
 
 
 def executed_parts(tree: SourceTree, executed: ExecutedFunctions) -> dict[str, dict[str, str]]:

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterable, Mapping
 
 from mutator.campaigns import run_environment
+from mutator.execution.golden_facts import GoldenFacts
 from mutator.mutants.mutant_building import Mutant
 from mutator.store.preflight_results import (
     packages_loaded_by_golden_runs,
@@ -19,10 +20,17 @@ class LoadedPackages:
         self._version_by_package = version_by_package
         self._golden_packages: tuple[str, ...] | None = None  # not read yet
         self._is_golden_unpackaged: bool | None = None
+        self._added_packages: set[str] = set()  # of golden runs that checks.json does not name yet
+        self._is_added_unpackaged = False
 
     def note_new_goldens(self) -> None:
         """Note that the run folder has more golden runs, which can have loaded more packages."""
         self._golden_packages = self._is_golden_unpackaged = None
+
+    def add_goldens(self, facts: GoldenFacts) -> None:
+        """Add golden runs that checks.json does not name yet."""
+        self._added_packages |= {*facts.packages}
+        self._is_added_unpackaged |= bool(facts.modules_without_package)
 
     def have_versions(self, version_by_package: Mapping[str, str | None]) -> bool:
         """Whether these packages have these versions here."""
@@ -44,13 +52,15 @@ class LoadedPackages:
     def _packages_of(self, modules: Collection[str]) -> set[str]:
         if self._golden_packages is None:
             self._golden_packages = packages_loaded_by_golden_runs(RunFolder(self._run_path))
-        return {*self._golden_packages, *(run_environment.packages_of_modules(modules) if modules else ())}
+        golden_packages = {*self._golden_packages, *self._added_packages}
+        return golden_packages.union(run_environment.packages_of_modules(modules) if modules else ())
 
     def _has_unpackaged(self, modules: Collection[str]) -> bool:
         """Whether no package provides one of these modules, or one that a golden run loaded."""
         if self._is_golden_unpackaged is None:
             self._is_golden_unpackaged = bool(unpackaged_modules_of_golden_runs(RunFolder(self._run_path)))
-        return self._is_golden_unpackaged or bool(run_environment.modules_without_package(modules))
+        is_golden_unpackaged = self._is_golden_unpackaged or self._is_added_unpackaged
+        return is_golden_unpackaged or bool(run_environment.modules_without_package(modules))
 
 
 def _modules_outside(mutant: Mutant, modules: Iterable[str]) -> set[str]:

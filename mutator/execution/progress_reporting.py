@@ -20,7 +20,7 @@ def reporting_progress(session: Session) -> Iterator[None]:
 
     def follow() -> None:
         while not stop.wait(_NOTIFY_INTERVAL_S):
-            session.notify(replace(next(stages), detail=session.workers_note))
+            session.notify(replace(next(stages), detail=_describe_detail(session)))
 
     thread = threading.Thread(target=follow, daemon=True)
     thread.start()
@@ -30,6 +30,10 @@ def reporting_progress(session: Session) -> Iterator[None]:
         stop.set()
         thread.join()
         session.notify(next(stages))
+
+
+def _describe_detail(session: Session) -> str:
+    return ", ".join(filter(None, (session.workers_note, session.checks.describe_progress())))
 
 
 def _progress_stages(session: Session) -> Iterator[Progress]:

@@ -51,7 +51,7 @@ class RunReuse:
         # a worker of a bench can begin long after its session, when somebody has edited the harness
         self._is_in_use = harness_digest() == assignment.harness
         self._searches = assignment.searches and self._is_in_use
-        self._packages = LoadedPackages(folder, assignment.version_by_package)
+        self.packages = LoadedPackages(folder, assignment.version_by_package)
         self._with_series = bool(folder.series_budget_mb)
         self._golden_digest_of = golden_digest_of
         self._stored = FinishedRuns()
@@ -69,7 +69,7 @@ class RunReuse:
                 and run.surroundings == self._surroundings
                 and is_storable(run.record)
                 and (run.faulty_series is not None or not self._with_series or run.record.status != Status.OK)
-                and self._packages.have_versions(run.packages)
+                and self.packages.have_versions(run.packages)
             )
 
         run = self._stored.find(self._key_of(experiment, mutant), is_usable)
@@ -88,7 +88,7 @@ class RunReuse:
         mutant, record = finished.mutant, finished.record
         if not self._is_in_use or mutant is None or finished.is_copied or not is_storable(record):
             return
-        packages = self._packages.versions(finished.third_party_modules, mutant)
+        packages = self.packages.versions(finished.third_party_modules, mutant)
         if packages is None:
             return  # it loaded code that can change
         executed = finished.executed_functions
@@ -103,7 +103,7 @@ class RunReuse:
 
     def note_new_goldens(self) -> None:
         """Note that the run folder has more golden runs."""
-        self._packages.note_new_goldens()
+        self.packages.note_new_goldens()
 
     def close(self) -> None:
         self._unproved.close()

@@ -6,7 +6,6 @@
 import os
 import re
 import time
-import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -33,7 +32,6 @@ from mutator.errors import (
     CheckFailed,
     DiskFull,
     MutatorError,
-    MutatorWarning,
 )
 from mutator.execution.code_recording import RecordingAssignment, build_recording_assignment
 from mutator.execution.earlier_run import EarlierRunUse
@@ -42,18 +40,14 @@ from mutator.execution.finished_outcome_cache import (
     find_finished_run,
     remember_finished_run,
 )
+from mutator.execution.session_checks import SessionChecks
 from mutator.execution.session_reuse import SessionReuse, count_reused
 from mutator.execution.session_summary import Summary
 from mutator.execution.worker import WorkerAssignment, WorkerStart
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Outcome, Record
 from mutator.preflight import equivalence_check
-from mutator.preflight.failed_golden_run_pages import with_golden_run_pages
-from mutator.preflight.preflight_checks import (
-    checks_and_goldens_exist,
-    describe_unreached_triggers,
-    run_checks,
-)
+from mutator.preflight.preflight_checks import checks_and_goldens_exist
 from mutator.results import table_building
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment
@@ -114,16 +108,18 @@ class Session:
         self._ledger_at_start: file_digests.DigestLedger | None = None  # as it was when the work began
         self._head_at_start = b""
         self.workers_note = ""  # the present workers, if known
+        self.checks = SessionChecks(workspace, workers=workers, secret=self.secret, notify=notify)
         self._start_s = time.monotonic()
         self._finished_count_before = 0
         self._records: Mapping[str, Record] | None = None
         self._earlier_outcome: FinishedRunOutcome | None = None
 
-    def prepare(self, packages: Iterable[str] = ()) -> None:
+    def prepare(self, packages: Iterable[str] = (), *, checks_beside: bool = False) -> None:
         """Find the work to do. If there is any, run the checks and begin a stretch, which records the
         versions of `packages` and of those that affect every run.
 
-        Unless `accept_versions`, raises MutatorError if versions of Python or packages have changed.
+        With `checks_beside`, whoever deals experiments to workers also deals `checks.beside`. Unless
+        `accept_versions`, raises MutatorError if versions of Python or packages have changed.
         """
         self._earlier_outcome = find_finished_run(self.folder)
         if self._earlier_outcome and checks_and_goldens_exist(self.folder):
@@ -148,9 +144,7 @@ class Session:
         if pending_chunks or self.proof or not checks_and_goldens_exist(self.folder):
             check_requirements(self.manifest)
             accepted_version_differences(self.folder, accept=self.accept_versions)
-            self._run_checks()
-            for remark in describe_unreached_triggers(self.workspace, self.folder):
-                warnings.warn(remark, MutatorWarning, stacklevel=2)
+            self.checks.begin(self.folder, beside_experiments=checks_beside and bool(pending_chunks))
             self.folder = begin_session_environment(
                 self.folder,
                 self.workspace,
@@ -158,7 +152,7 @@ class Session:
                 packages=packages,
                 accept_versions=self.accept_versions,
             )
-            self.golden_digests = golden_digests(self.folder)
+            self.golden_digests = {} if self.checks.beside else golden_digests(self.folder)
             self._ledger_at_start = file_digests.load_ledger(self.folder.path)
         self.pending = pending_chunks
         self._records = None if pending_chunks else records
@@ -170,14 +164,6 @@ class Session:
         self.pending = pending_chunks_of(self.folder, records)
         self.proof = equivalence_check.remaining_sampled_experiments(self.folder)
         self.golden_digests = golden_digests(self.folder)
-
-    def _run_checks(self) -> None:
-        try:
-            run_checks(
-                self.workspace, self.folder, workers=self.workers, notify=self.notify, secret=self.secret
-            )
-        except CheckFailed as error:
-            raise with_golden_run_pages(error, self.folder.path, self.workspace) from None
 
     def note_machine(self, machine: WorkerMachine) -> None:
         self.note_own_files(append_worker_machine(self.folder, machine))
@@ -273,6 +259,11 @@ class Session:
             return self._finish_finished_run(self._earlier_outcome)
         ensure_work_folder(self.folder.scratch_folder)  # readers refuse what a mutant can put in its place
         self._undo_writes_of_mutants()
+        was_cut_off = self.interrupted or bool(self.problem)
+        with self._noting_full_disk():
+            if self.checks.finish(self.folder, was_cut_off=was_cut_off):
+                self.note_own_files(add_loaded_packages(self.folder))
+        is_provisional = self.checks.were_abandoned
         records = self.folder.records() if self._records is None else self._records
         ends = Counter((ending.status, ending.outcome) for ending in endings_of(records))
         failed = (ending.experiment_id for ending in endings_of(records) if not ending.is_final)
@@ -281,24 +272,25 @@ class Session:
         results_path = None
         with self._noting_full_disk():
             self._close_segments()
-            if tables_of_part or finished_count == self.folder.planned_experiment_count:
+            is_whole = finished_count == self.folder.planned_experiment_count
+            if (tables_of_part or is_whole) and not is_provisional:
                 results_path = table_building.ensure_tables(self.folder.path)
                 self._pack_series()
         proven = self.compare_sample(records)
         not_forked = "" if proven else self._not_forked
         if (
             proven
-            and finished_count == self.folder.planned_experiment_count
+            and is_whole
             and (why := equivalence_check.reason_check_not_needed(self.folder)) is not None
         ):
             proven, not_forked = None, self._not_forked or why
             with self._noting_full_disk():
                 equivalence_check.remove_proof(self.folder)
-        if finished_count == self.folder.planned_experiment_count and (proven is None or proven.is_complete):
+        if is_whole and not is_provisional and (proven is None or proven.is_complete):
             with self._noting_full_disk():
                 self._close_segments(finished=True)
         has_proof = proven.is_complete if proven else bool(not_forked) or self.engine == REFERENCE
-        if self.reuse and has_proof:
+        if self.reuse and has_proof and not is_provisional:
             self.reuse.store_proved_runs(self.folder, records)
         outcomes = Counter[str]()
         for (status, outcome), count in ends.items():
@@ -325,6 +317,7 @@ class Session:
             has_reached_nothing=self._has_reached_nothing(outcomes),
             reused=count_reused(self.folder, self.worker_prefix),
             unselected=self._unselected_count,
+            is_provisional=is_provisional,
             left_out=left_out,
             since_note=since_note,
         )

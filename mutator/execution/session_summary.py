@@ -34,6 +34,7 @@ class Summary:
     reused: int = 0  #: experiments of this session whose result was copied from an earlier run
     left_out: int = 0  #: experiments that `since` left out: their earlier records stand
     since_note: str = ""  #: what `since` left out, and why others ran; empty without it
+    is_provisional: bool = False  #: whether the session ended before all checks had passed
     unselected: int = 0  #: experiments without a record that `last_failed` did not select
 
     @property
@@ -49,6 +50,13 @@ class Summary:
         if not self.unselected:
             return ""
         return f"not selected by --last-failed: {self.unselected:,}; without it, the same command runs them"
+
+    @property
+    def provisional_note(self) -> str:
+        """That the verdicts so far are provisional; empty if they are not."""
+        if not self.is_provisional:
+            return ""
+        return "not all checks have passed yet: the verdicts so far are provisional, and have no table"
 
     @property
     def seal(self) -> str | None:

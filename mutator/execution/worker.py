@@ -23,6 +23,7 @@ from mutator.execution.experiment_runner import (
     find_nothing,
     record_without_outcome,
 )
+from mutator.execution.golden_facts import GoldenFacts
 from mutator.execution.run_reuse import ReuseAssignment, RunReuse
 from mutator.execution.suspended_workers import on_resume
 from mutator.execution.unaffected_runs import UnaffectedRuns
@@ -155,6 +156,13 @@ class Worker:
             self._reuse.note_new_goldens()
         if goldens and self._recording:
             self._recording.note_new_goldens()
+
+    def add_goldens(self, facts: GoldenFacts) -> None:
+        """Add golden runs whose checks have passed since this worker began, before any are in checks.json."""
+        self.add_inputs(goldens=facts.digest_by_key)
+        for part in (self._reuse, self._recording):
+            if part:
+                part.packages.add_goldens(facts)
 
     def _find_copied_run(self, experiment: Experiment, mutant: Mutant) -> CopiedRun | None:
         finders = (self._unaffected, self._reuse)

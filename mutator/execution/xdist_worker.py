@@ -6,6 +6,7 @@ have passed.
 
 import pickle
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from mutator.execution.campaign_items import (
     node_id_of_file,
     source_of,
 )
+from mutator.execution.golden_facts import GoldenFacts
 from mutator.execution.item_running import ItemRunner, ItemsStart
 from mutator.execution.listed_items import ItemListing
 from mutator.execution.requested_campaigns import WORKER_INPUT_KEY
@@ -28,6 +30,7 @@ from mutator.store.run_folder import RunFolder
 
 WRITTEN_KEY = "mutator_written"
 START_COMMAND = "mutator_start"
+GOLDENS_COMMAND = "mutator_goldens"
 
 
 class WorkerSource(ItemSource):
@@ -38,10 +41,18 @@ class WorkerSource(ItemSource):
         self._listing = listing
         self.start = ItemsStart(problem="the controller has not sent what is needed to begin")
         self._process: WorkerOfProcess | None = None
+        self.new_goldens: SimpleQueue[GoldenFacts] = SimpleQueue()  # filled by another thread
 
     @property
     def listing(self) -> ItemListing:
         return self._listing
+
+    def ensure_runner(self) -> ItemRunner:
+        runner = super().ensure_runner()
+        while not self.new_goldens.empty():
+            assert self._process is not None
+            self._process.ensure_worker().add_goldens(self.new_goldens.get())
+        return runner
 
     def _begin(self) -> ItemRunner:
         if self.start.worker is None:
@@ -101,7 +112,7 @@ class WorkerPlugin:
 
 
 def _receive_starts(config: pytest.Config, sources: dict[str, WorkerSource]) -> None:
-    """Let the worker understand a further command, which comes before the items to run."""
+    """Let the worker understand further commands, which come before the items that need them."""
     manager = config.pluginmanager
     interactor: Any = next(p for p in manager.get_plugins() if type(p).__name__ == "WorkerInteractor")
     handle_command = interactor.handle_command
@@ -110,6 +121,9 @@ def _receive_starts(config: pytest.Config, sources: dict[str, WorkerSource]) -> 
         if isinstance(command, tuple) and command[0] == START_COMMAND:
             for path, start in command[1]["starts"].items():
                 sources[path].start = ItemsStart.from_bytes(start)
+        elif isinstance(command, tuple) and command[0] == GOLDENS_COMMAND:
+            for source in sources.values():
+                source.new_goldens.put(GoldenFacts.from_bytes(command[1]["facts"]))
         else:
             handle_command(command)
 

@@ -32,8 +32,7 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
-GOLDEN, GOLDEN_AGAIN, NULL_MUTANT = "golden", "golden again", "null mutant"
-_CANARY = "canary"
+GOLDEN, GOLDEN_AGAIN, NULL_MUTANT, CANARY = "golden", "golden again", "null mutant", "canary"
 _OTHER_HASH_SEED = 4242  # any but 0, with which golden runs are made: the order of sets of strings differs
 
 OnProgress = Callable[[Progress], None]
@@ -60,35 +59,33 @@ class CheckRunner:
         self, workers: int, notify: OnProgress
     ) -> tuple[CheckRunByName, canary_check.CanaryVerdict | None]:
         """Do all runs of all checks, `workers` at a time. Return them with the verdict on a canary."""
-        with self._engine_and_pool(workers) as (engine, pool):
+        with self.engine_and_pool(workers) as (engine, pool):
             futures = {
-                name: pool.submit(self._run_job, engine, name, job)
-                for name, job in self._jobs_by_name().items()
+                name: pool.submit(self.run_job, engine, name, job)
+                for name, job in self.jobs_by_name().items()
             }
             # last, because it waits for the golden runs, which have then begun
-            judged = pool.submit(self._judge_canary, engine, futures)
+            judged = pool.submit(self._judge_canary_after_goldens, engine, futures)
             nulls = [future for name, future in futures.items() if name[0] == NULL_MUTANT]
             goldens = [future for name, future in futures.items() if name[0] == GOLDEN]
             _report_progress("checks", [judged, *nulls], notify)
             _report_progress("golden", goldens, notify)
             runs = {name: future.result() for name, future in futures.items()}
             for key in self.golden_runs:
-                runs |= self._repetitions(engine, pool, key, runs)
+                runs |= self.repetitions(engine, key, runs)
             return runs, judged.result()
 
     def repeat_goldens(self, workers: int, notify: OnProgress) -> dict[str, str]:
         """Do each golden run once, as null mutant; return the digests of what they write, by key."""
-        jobs = {name: job for name, job in self._jobs_by_name().items() if name[0] == NULL_MUTANT}
-        with self._engine_and_pool(workers) as (engine, pool):
+        jobs = {name: job for name, job in self.jobs_by_name().items() if name[0] == NULL_MUTANT}
+        with self.engine_and_pool(workers) as (engine, pool):
             futures = {
-                name[1].key: pool.submit(self._run_job, engine, name, job) for name, job in jobs.items()
+                name[1].key: pool.submit(self.run_job, engine, name, job) for name, job in jobs.items()
             }
             _report_progress("golden", [*futures.values()], notify)
             return {key: future.result().output_digest for key, future in futures.items()}
 
-    def _repetitions(
-        self, engine: ReferenceEngine, pool: ThreadPoolExecutor, key: GoldenRun, runs: CheckRunByName
-    ) -> CheckRunByName:
+    def repetitions(self, engine: ReferenceEngine, key: GoldenRun, runs: CheckRunByName) -> CheckRunByName:
         """Return the runs that stand for the repeated golden run and the null mutant: the one that there is
         or, if it is not sound, two that tell causes apart.
         """
@@ -102,11 +99,10 @@ class CheckRunner:
             (GOLDEN_AGAIN, key): Job(name=f"b-{key.key}", hash_seed=_OTHER_HASH_SEED, **common),
             (NULL_MUTANT, key): replace(null_job, name=f"m-{key.key}", hash_seed=0, drive_step_by_step=False),
         }
-        futures = {name: pool.submit(self._run_job, engine, name, job) for name, job in jobs.items()}
-        return {name: future.result() for name, future in futures.items()}
+        return {name: self.run_job(engine, name, job) for name, job in jobs.items()}
 
     @contextmanager
-    def _engine_and_pool(self, workers: int) -> Iterator[tuple[ReferenceEngine, ThreadPoolExecutor]]:
+    def engine_and_pool(self, workers: int) -> Iterator[tuple[ReferenceEngine, ThreadPoolExecutor]]:
         work = self.scratch_folder / "checks"
         for scratch in (work, self.pending_folder):
             remove_folder(scratch)
@@ -125,19 +121,23 @@ class CheckRunner:
             campaign.limits, campaign.measured_limit_names, [run.cpu_s for run in golden_runs]
         )
 
-    def _judge_canary(
+    def _judge_canary_after_goldens(
         self, engine: ReferenceEngine, futures: Mapping[tuple[str, Any], Future[CheckRun]]
     ) -> canary_check.CanaryVerdict | None:
+        goldens = [future.result() for name, future in futures.items() if name[0] == GOLDEN]
+        return self.judge_canary(engine, self.measure_limits(goldens))
+
+    def judge_canary(self, engine: ReferenceEngine, limits: Limits) -> canary_check.CanaryVerdict | None:
+        """Run the canary with the limits of faulty runs; None without one."""
         experiment, facts = self.canary_experiment, self.campaign.canary
         if experiment is None or facts is None:
             return None
-        goldens = [future.result() for name, future in futures.items() if name[0] == GOLDEN]
-        canary_engine = ReferenceEngine(self.manifest, engine.work_folder, self.measure_limits(goldens))
+        canary_engine = ReferenceEngine(self.manifest, engine.work_folder, limits)
 
         def run(experiment: Experiment) -> CheckRun:
-            return self._run_job(
+            return self.run_job(
                 canary_engine,
-                (_CANARY, None),
+                (CANARY, None),
                 canary_check.build_canary_job(self.workspace, self.manifest, experiment),
             )
 
@@ -147,7 +147,7 @@ class CheckRunner:
             facts.hazard,
         )
 
-    def _jobs_by_name(self) -> dict[tuple[str, Any], Job]:
+    def jobs_by_name(self) -> dict[tuple[str, Any], Job]:
         # null mutants first: their stage is reported before that of the golden runs
         nulls = {(NULL_MUTANT, key): self._null_job(key) for key in self.golden_runs}
         return nulls | {
@@ -177,7 +177,7 @@ class CheckRunner:
     def _null_mutant(self) -> Mutant:
         return build(self.manifest, self.workspace.fault_models(), None, always_trigger())
 
-    def _run_job(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
+    def run_job(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
         scratch = path_below(engine.work_folder, job.name)
         try:
             execution = engine.execute(job, scratch)

@@ -1,7 +1,7 @@
 """The checks that must pass before a campaign starts: equal golden runs, null mutants, canary, anchors."""
 
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, Limits
 from mutator.mutants.mutant_building import build
 from mutator.preflight import preflight_cache, unreached_triggers
+from mutator.preflight.canary_check import CanaryVerdict
 from mutator.preflight.check_run_problems import (
     CheckRun,
     equal_scenarios_problem,
@@ -68,13 +69,20 @@ def run_checks(
     mutant can write to the cache. Fork engines with the same `secret` take from the null mutants what these
     observe. Raises CheckFailed if any check fails, after all have run.
     """
-    checks = _PreflightChecks(workspace, folder, secret)
+    checks = PreflightChecks(workspace, folder, secret)
     notify = notify or (lambda progress: None)
     earlier_results = checks.find_earlier_results(workers, notify)
     if earlier_results is not None:
         return earlier_results
     with raising_disk_full(folder.path):
         results = tuple(checks.run(workers, notify))
+    raise_if_failed(folder, results)
+    checks.store_in_cache()
+    return results
+
+
+def raise_if_failed(folder: RunFolder, results: Sequence[CheckResult]) -> None:
+    """Raise CheckFailed if any check has failed."""
     failed = [result for result in results if not result.passed]
     if failed:
         text = "; ".join(f"{result.name}: {result.detail}" for result in failed[:3])
@@ -84,10 +92,6 @@ def run_checks(
             remedy="fix target, templates or canary (`mutator check --drive` shows details); the campaign "
             "starts only if all pass",
         )
-    preflight_cache.store_passed_checks(
-        preflight_cache.cached_checks_path(checks.digest), folder.path, CHECKS_FILE, checks.pending_folder
-    )
-    return results
 
 
 def describe_unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
@@ -113,7 +117,7 @@ def _pending_folder(folder: RunFolder) -> Path:
     return folder.scratch_folder / "kept"
 
 
-class _PreflightChecks:
+class PreflightChecks:
     def __init__(self, workspace: Workspace, folder: RunFolder, secret: bytes) -> None:
         head = folder.head
         self.observation_store = ObservationStore(folder.scratch_folder, secret) if secret else None
@@ -158,7 +162,7 @@ class _PreflightChecks:
             return None  # missing or damaged
         if results is not None:
             if (
-                self._build_check_runner(self.folder.scratch_folder / "again").repeat_goldens(workers, notify)
+                self.build_check_runner(self.folder.scratch_folder / "again").repeat_goldens(workers, notify)
                 != stored["goldens"]
             ):
                 return None  # forged, or no longer true
@@ -179,17 +183,35 @@ class _PreflightChecks:
         return results if all(result.passed for result in results) else None
 
     def run(self, workers: int, notify: OnProgress) -> Iterator[CheckResult]:
-        anchors = self._judge_anchors()
+        anchors = self.judge_anchors()
         if not anchors.passed:  # the runs would take minutes
             yield anchors
             return
-        check_runner = self._build_check_runner(self.pending_folder)
+        check_runner = self.build_check_runner(self.pending_folder)
         runs, canary_verdict = check_runner.run_all(workers, notify)
+        yield from self.judge_and_store(anchors, check_runner, runs, canary_verdict)
+
+    def judge_and_store(
+        self,
+        anchors: CheckResult,
+        check_runner: CheckRunner,
+        runs: CheckRunByName,
+        canary_verdict: CanaryVerdict | None,
+    ) -> Sequence[CheckResult]:
+        """Judge the runs, and store results and golden runs in the run folder."""
         results = [anchors, *self._judge_goldens(runs)]
         if canary_verdict:
             results.append(build_check_result("canary", canary_verdict.problem, canary_verdict.success))
         goldens = {golden_run.key: runs[GOLDEN, golden_run].output_digest for golden_run in self.golden_runs}
         self._check_goldens_same_as_before(goldens)
+        for golden_run in self.golden_runs:
+            place = path_below(self.pending_folder / "golden", golden_run.key)
+            if goldens[golden_run.key] and output_digest_of(self.manifest, place) != goldens[golden_run.key]:
+                raise MutatorError(
+                    "a golden run was changed by a mutant, or by another program",
+                    where=place,
+                    remedy="run the same command again; `--sandbox` keeps mutants from it",
+                )
         golden_runs = [runs[GOLDEN, key] for key in self.golden_runs]
         checks = {
             "schema": CHECKS_SCHEMA,
@@ -202,9 +224,28 @@ class _PreflightChecks:
             **measured_limits_as_json(check_runner.measure_limits(golden_runs)),
         }
         self._store_in_run_folder(checks)
-        yield from results
+        return results
 
-    def _build_check_runner(self, pending_folder: Path) -> CheckRunner:
+    def store_in_cache(self) -> None:
+        """Store passed checks for other run folders."""
+        cached = preflight_cache.cached_checks_path(self.digest)
+        preflight_cache.store_passed_checks(cached, self.folder.path, CHECKS_FILE, self.pending_folder)
+
+    def place_golden_run(self, golden_run: GoldenRun, output_digest: str) -> None:
+        """Copy a golden run whose own checks have passed into the run folder, where experiments need it.
+
+        CheckFailed if the experiments that have a record had another one.
+        """
+        self._check_goldens_same_as_before({golden_run.key: output_digest})
+        copy = self.folder.scratch_folder / "placed"
+        shutil.rmtree(copy, ignore_errors=True)
+        shutil.copytree(path_below(self.pending_folder / "golden", golden_run.key), copy)
+        place = path_below(self.folder.path / "golden", golden_run.key)
+        shutil.rmtree(place, ignore_errors=True)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        copy.rename(place)  # a killed command leaves it complete, or not there
+
+    def build_check_runner(self, pending_folder: Path) -> CheckRunner:
         return CheckRunner(
             workspace=self.workspace,
             manifest=self.manifest,
@@ -273,7 +314,7 @@ class _PreflightChecks:
             name = golden_run._replace(scenario="+".join(goldens)).key
             yield build_check_result(f"same {name}", equal_scenarios_problem(goldens), "one run for all")
 
-    def _judge_anchors(self) -> CheckResult:
+    def judge_anchors(self) -> CheckResult:
         problem = anchor_problem(self.manifest, self.models, self.fault_by_variant.values())
         return anchor_result(problem, len(self.fault_by_variant))
 

@@ -27,6 +27,7 @@ from mutator.results.table_columns import TIMING_COLUMNS, cells_by_column, resul
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import FileDigest
 from mutator.store.planned_experiments import PlannedExperiments
+from mutator.store.preflight_results import are_verdicts_provisional
 from mutator.store.run_folder import RunFolder
 
 CSV_FILE, PARQUET_FILE, TIMINGS_FILE = "results.csv", "results.parquet", "timings.parquet"
@@ -48,9 +49,17 @@ def ensure_tables(run: Path) -> Path:
 def build_tables(run: Path) -> Path:
     """Write the tables of a run folder from plan and records, and return the path of results.csv.
 
-    MutatorWarning if a table that was edited by hand is overwritten, or has renamed columns.
+    MutatorWarning if a table that was edited by hand is overwritten, or has renamed columns. MutatorError if
+    not all checks of the run have passed.
     """
     folder = RunFolder.open(run)
+    if are_verdicts_provisional(folder):
+        raise MutatorError(
+            "its verdicts are provisional, because not all of its checks have passed",
+            where=folder.path,
+            expected="a run whose checks have passed",
+            remedy="run the same `mutator run` command again: it goes on, or says which check fails",
+        )
     inputs_digest = _inputs_digest(folder)
     with ExitStack() as stack:
         # The stack exits in reverse order, so the first table is replaced first.

@@ -23,6 +23,14 @@ def check_results(folder: RunFolder) -> tuple[CheckResult, ...]:
     return tuple(CheckResult(**result) for result in stored)
 
 
+def are_verdicts_provisional(folder: RunFolder) -> bool:
+    """Whether experiments have begun to run, and not all checks have passed."""
+    if not folder.session_environments:
+        return False
+    has_checks = (folder.path / CHECKS_FILE).is_file()
+    return not (has_checks and all(result.passed for result in check_results(folder)))
+
+
 def packages_loaded_by_golden_runs(folder: RunFolder) -> tuple[str, ...]:
     path = folder.path / CHECKS_FILE
     return tuple(read_json(path, CHECKS_SCHEMA).get("packages", ())) if path.is_file() else ()

@@ -110,3 +110,76 @@ def test_a_scheduler_that_the_user_names_is_used(words: list[str], is_chosen: bo
     alone = ["-c", os.devnull, "--rootdir", str(tmp_path), "--disable-plugin-autoload", "-p", "xdist"]
     pytest.main([*alone, "-p", "no:terminal", "--collect-only", *words, str(tmp_path)], plugins=[Asking()])
     assert answers == [is_chosen]
+
+
+class Checks:
+    """Checks of golden runs A and B, two runs each, which end when a test says so."""
+
+    def __init__(self) -> None:
+        self.waiting, self.begun, self.ended = 4, 0, 0
+
+    @property
+    def running(self) -> int:
+        return self.begun - self.ended
+
+    @property
+    def has_waiting(self) -> bool:
+        return self.begun < self.waiting
+
+    def start_next(self) -> None:
+        self.begun += 1
+
+    def is_checked(self, golden_key: object) -> bool:
+        return self.ended >= {"A": 2, "B": 4}[str(golden_key)]
+
+
+def test_pieces_wait_for_the_checks_of_their_golden_run() -> None:
+    """A check takes the place of a worker. As soon as something can run, one worker runs experiments."""
+    nodes, checks = (Node("gw0"), Node("gw1")), Checks()
+    options: Any = SimpleNamespace(
+        getvalue=lambda name: ["popen"] * 2, getoption=lambda name: None, option=SimpleNamespace()
+    )
+    names = "A" * 12 + "B" * 12
+    schedule = PieceScheduling(
+        options,
+        None,
+        lambda node_id: node_id[0],
+        lambda: checks if checks.has_waiting or checks.running else None,
+        checks.is_checked,
+    )
+    for node in nodes:
+        schedule.add_node(node)
+    for node in nodes:
+        schedule.add_node_collection(node, [f"{name}{number}" for number, name in enumerate(names)])
+    schedule.schedule()
+    assert (checks.running, nodes[0].items, nodes[1].items) == (2, [], [])
+    checks.ended = 2
+    schedule.deal()
+    assert (checks.running, len(nodes[0].items) >= 2, nodes[1].items) == (1, True, [])
+    assert {names[index] for index in nodes[0].items} == {"A"}
+    checks.ended = 3
+    schedule.deal()
+    assert (checks.running, nodes[1].items) == (1, [])  # the last one
+    checks.ended = 4
+    schedule.deal()
+    assert nodes[1].items
+    done = work_through(schedule, *nodes)
+    assert sorted(done["gw0"] + done["gw1"]) == list(range(24))
+    assert all(node.shutting_down for node in nodes)
+
+
+def test_one_worker_runs_what_is_checked_before_further_checks() -> None:
+    node, checks = Node("gw0"), Checks()
+    options: Any = SimpleNamespace(
+        getvalue=lambda name: ["popen"], getoption=lambda name: None, option=SimpleNamespace()
+    )
+    schedule = PieceScheduling(options, None, lambda node_id: node_id[0], lambda: checks, checks.is_checked)
+    schedule.add_node(node)
+    schedule.add_node_collection(node, ["A0", "A1", "B2", "B3"])
+    schedule.schedule()
+    assert (checks.begun, node.items) == (1, [])
+    checks.ended = 1
+    schedule.deal()
+    checks.ended = 2
+    schedule.deal()
+    assert (checks.begun, node.items) == (2, [0, 1])
