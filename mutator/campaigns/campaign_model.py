@@ -89,7 +89,7 @@ _NAMES_SCHEMA = {"type": "array", "items": {"type": "string"}}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Canary:
-    """A fault known to be harmful. The campaign starts only if this fault causes its hazard."""
+    """A fault known to be harmful. The campaign has results only if this fault causes its hazard."""
 
     __pydantic_config__ = pydantic_mapping_config("The canary")
 

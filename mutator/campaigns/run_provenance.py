@@ -138,12 +138,15 @@ def append_session_environment(folder: RunFolder, stretch: SessionEnvironment) -
     return _write_session_environments(folder, (*folder.session_environments, stretch))
 
 
-def add_loaded_packages(folder: RunFolder) -> RunFolder:
-    """Add the versions of packages that golden runs have loaded since the session began."""
+def add_loaded_packages(folder: RunFolder, packages: Iterable[str] | None = None) -> RunFolder:
+    """Add the versions of packages that golden runs have loaded since the session began: `packages` or, if
+    None, those in checks.json.
+    """
     if not folder.session_environments:
         return folder
     *before, last = folder.session_environments
-    missing = {*packages_loaded_by_golden_runs(folder)} - last.packages.keys()
+    loaded = packages_loaded_by_golden_runs(folder) if packages is None else packages
+    missing = {*loaded} - last.packages.keys()
     versions = run_environment.package_versions(missing)
     if not any(versions.values()):
         return folder

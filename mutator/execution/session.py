@@ -145,15 +145,8 @@ class Session:
             check_requirements(self.manifest)
             accepted_version_differences(self.folder, accept=self.accept_versions)
             self.checks.begin(self.folder, beside_experiments=checks_beside and bool(pending_chunks))
-            self.folder = begin_session_environment(
-                self.folder,
-                self.workspace,
-                records_glob=f"{self.worker_prefix}*",
-                packages=packages,
-                accept_versions=self.accept_versions,
-            )
+            self.begin_environment(f"{self.worker_prefix}*", packages)
             self.golden_digests = {} if self.checks.beside else golden_digests(self.folder)
-            self._ledger_at_start = file_digests.load_ledger(self.folder.path)
         self.pending = pending_chunks
         self._records = None if pending_chunks else records
 
@@ -172,12 +165,18 @@ class Session:
         """Note that the plan of a bench has grown, and which packages its golden runs load."""
         self.note_own_files(add_loaded_packages(folder))
 
-    def begin_environment(self, records_glob: str) -> None:
-        """Record the software and machine of a bench, before its first run."""
+    def note_packages(self, packages: Iterable[str]) -> None:
+        """Note packages that golden runs have loaded whose checks have passed."""
+        self.check_own_files()
+        self.note_own_files(add_loaded_packages(self.folder, packages))
+
+    def begin_environment(self, records_glob: str, packages: Iterable[str] = ()) -> None:
+        """Record the software and machine of this session, before its first run."""
         folder = begin_session_environment(
             self.folder,
             self.workspace,
             records_glob=records_glob,
+            packages=packages,
             accept_versions=self.accept_versions,
         )
         self.note_own_files(folder)

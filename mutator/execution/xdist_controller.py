@@ -8,7 +8,7 @@ import os
 import pickle
 import shlex
 import signal
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -37,10 +37,8 @@ from mutator.execution.session_items import SessionItems
 from mutator.execution.session_summary import Summary
 from mutator.execution.suspended_workers import WorkerContinuer
 from mutator.execution.worker_processes import python_command_dying_with
-from mutator.execution.xdist_worker import GOLDENS_COMMAND, START_COMMAND, WRITTEN_KEY
-from mutator.preflight.checks_beside_experiments import ChecksBesideExperiments
-
-_CHECKS_EVENT = "mutator_checks"
+from mutator.execution.xdist_checks import XdistChecks
+from mutator.execution.xdist_worker import START_COMMAND, WRITTEN_KEY
 
 
 class WorkDistributor(Protocol):
@@ -82,70 +80,20 @@ class CampaignController:
         self._begun_nodes: set[Any] = set()
         self._golden_key_by_name: dict[str, str] = {}
         self._is_interrupted = False
-        self._scheduler: Any = None
+        self._checks = next(
+            (XdistChecks(s.session) for s in sources.values() if isinstance(s, PreparedRun) and s.session),
+            None,
+        )
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_xdist_setupnodes(self, config: pytest.Config, specs: Sequence[Any]) -> None:
-        self._config = config
         self._worker_continuer = WorkerContinuer()
         for spec in specs:
             if spec.popen and not spec.python:
                 spec.python = shlex.join(python_command_dying_with(os.getpid()))
 
-        self._begin_checks(len(specs))
-
-    def _begin_checks(self, count: int) -> None:
-        """Begin checks on all cores, while workers start. Their ends come to xdist's loop as events."""
-        session = self._checked_session
-        if session is None or (checks := session.checks.beside) is None:
-            return
-        loop = self._config.pluginmanager.getplugin("dsession")
-        setattr(loop, f"worker_{_CHECKS_EVENT}", self._note_checks)
-        checks.on_end = lambda: loop.queue.put((_CHECKS_EVENT, {}))
-        while checks.has_waiting and checks.running < count:
-            checks.start_next()
-
-    def _note_checks(self) -> None:
-        """Let workers run what the checks have passed that ended, and stop everything if one has failed."""
-        session = self._checked_session
-        if session is None or (checks := session.checks.beside) is None:
-            return
-        try:
-            passed = session.checks.take_passed()
-        except MutatorError as err:
-            _note_problem(session, str(err))
-            self._stop(str(err))
-            return
-        if checks.has_failed:
-            self._stop("a check has failed")
-            return
-        facts = session.checks.golden_facts(session.manifest, passed).to_bytes()
-        for node in self._begun_nodes:
-            if passed and not node.shutting_down:
-                node.sendcommand(GOLDENS_COMMAND, facts=facts)
-        if not self._begun_nodes:  # workers still start
-            while checks.has_waiting and checks.running < checks.workers:
-                checks.start_next()
-            return
-        for node in [*self._scheduler.nodes]:
-            self._scheduler.check_schedule(node)
-
-    def _stop(self, reason: str) -> None:
-        self._config.pluginmanager.getplugin("dsession").shouldstop = reason
-
-    @property
-    def _checked_session(self) -> Session | None:
-        """The session whose checks are dealt; None if there is none."""
-        sources = [source for source in self._sources.values() if isinstance(source, PreparedRun)]
-        return sources[0].session if sources else None
-
-    def _remaining_checks(self) -> ChecksBesideExperiments | None:
-        checks = self._checked_session.checks.beside if self._checked_session else None
-        return checks if checks and (checks.has_waiting or checks.running) else None
-
-    def _is_checked(self, golden_key: Hashable) -> bool:
-        session = self._checked_session
-        return session is None or session.checks.can_use(str(golden_key))
+        if self._checks is not None:
+            self._checks.begin(config, len(specs))
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: Any) -> None:
@@ -165,9 +113,14 @@ class CampaignController:
         scheduler = yield
         if not is_scheduler_chosen(config) and self._has_only_campaigns(config):
             scheduler = PieceScheduling(
-                config, log, self._golden_key_of, self._remaining_checks, self._is_checked
+                config,
+                log,
+                self._golden_key_of,
+                self._checks.remaining if self._checks else lambda: None,
+                self._checks.is_checked if self._checks else lambda golden_key: True,
             )
-        self._scheduler = scheduler
+        if self._checks is not None:
+            self._checks.scheduler = scheduler
         _call_before(scheduler, "add_node_collection", self._note_collection)
         _call_before(scheduler, "schedule", lambda: self._begin_workers(config, scheduler.nodes))
         return scheduler
@@ -268,9 +221,8 @@ class CampaignController:
                 if path in selected
             }
             node.sendcommand(START_COMMAND, starts=starts)
-            if (session := self._checked_session) and session.checks.beside:
-                facts = session.checks.golden_facts(session.manifest)
-                node.sendcommand(GOLDENS_COMMAND, facts=facts.to_bytes())
+            if self._checks is not None:
+                self._checks.note_worker_began(node)
 
 
 class StandaloneController(CampaignController):

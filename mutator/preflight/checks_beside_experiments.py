@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from queue import SimpleQueue
 from typing import Any
 
+from mutator.errors import CheckFailed
 from mutator.preflight.canary_check import CanaryVerdict
 from mutator.preflight.check_run_problems import CheckRun
 from mutator.preflight.preflight_check_runner import (
@@ -110,10 +111,17 @@ class ChecksBesideExperiments:
             if {(GOLDEN, name[1]), (NULL_MUTANT, name[1])} <= self._runs.keys():
                 if self._is_sound(name[1]):
                     run = passed[name[1].key] = self._runs[GOLDEN, name[1]]
-                    self._checks.place_golden_run(name[1], run.output_digest)
+                    self._place(name[1], run.output_digest)
                 else:
                     self.has_failed = True
         return passed
+
+    def _place(self, golden_run: GoldenRun, output_digest: str) -> None:
+        try:
+            self._checks.place_golden_run(golden_run, output_digest)
+        except CheckFailed:
+            self.has_failed = True
+            raise
 
     def finish(self, notify: OnProgress) -> None:
         """Do all runs that remain, judge them, and store what `run_checks` does; CheckFailed as there."""

@@ -109,7 +109,7 @@ def _page_html(name: str, detail: str, drive: dict[str, Any]) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{title} - mutator</title>\n<style>{style}</style></head>\n<body><main>\n"
         f"<h1>{title}</h1>\n<p>This run without a fault failed its check: {escape(detail)}.\n"
-        "So the campaign did not start. The replay draws it twice, as golden and as faulty.</p>\n"
+        "So the campaign has no results. The replay draws it twice, as golden and as faulty.</p>\n"
         '<div id="replay"></div>\n'
         f"</main>\n{packed_script_element(drive, 'drive')}\n<script>{script}</script></body></html>\n"
     )

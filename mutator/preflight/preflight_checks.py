@@ -89,8 +89,8 @@ def raise_if_failed(folder: RunFolder, results: Sequence[CheckResult]) -> None:
         raise CheckFailed(
             f"{len(failed)} of {len(results)} checks before the campaign failed: {text}",
             where=folder.path / CHECKS_FILE,
-            remedy="fix target, templates or canary (`mutator check --drive` shows details); the campaign "
-            "starts only if all pass",
+            remedy="fix target, templates or canary (`mutator check --drive` shows details); a campaign "
+            "has results only if all pass",
         )
 
 
