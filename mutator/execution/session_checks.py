@@ -82,7 +82,7 @@ class SessionChecks:
         checks, self.beside = self.beside, None
         if checks is None:
             return False
-        if was_cut_off and not checks.has_failed and (checks.has_waiting or checks.running):
+        if was_cut_off and not checks.has_failed and checks.has_remaining:
             checks.close()
             self.were_abandoned = True
             return False
@@ -98,7 +98,9 @@ class SessionChecks:
     def describe_progress(self) -> str:
         """Say that verdicts are provisional, and how far the checks are; empty once all have passed."""
         checks = self.beside
-        return f"provisional: {checks.done} of {checks.total} checks done" if checks else ""
+        if checks is None or not checks.has_remaining:
+            return ""
+        return f"provisional: {checks.done} of {checks.total} checks done"
 
     def _warn_of_unreached_triggers(self, folder: RunFolder) -> None:
         for remark in describe_unreached_triggers(self._workspace, folder):

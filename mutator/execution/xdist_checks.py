@@ -33,7 +33,7 @@ class XdistChecks:
     def remaining(self) -> ChecksBesideExperiments | None:
         """Return the checks if any have not ended."""
         checks = self._session.checks.beside
-        return checks if checks and (checks.has_waiting or checks.running) else None
+        return checks if checks and checks.has_remaining else None
 
     def is_checked(self, golden_key: Hashable) -> bool:
         """Whether experiments with this golden run can run."""

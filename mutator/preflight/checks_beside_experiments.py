@@ -84,6 +84,11 @@ class ChecksBesideExperiments:
         return len(self._running)
 
     @property
+    def has_remaining(self) -> bool:
+        """Whether any run has not ended."""
+        return bool(self._waiting or self._running)
+
+    @property
     def has_waiting(self) -> bool:
         return bool(self._waiting)
 
@@ -114,6 +119,8 @@ class ChecksBesideExperiments:
                     self._place(name[1], run.output_digest)
                 else:
                     self.has_failed = True
+        if not self.has_remaining and not self.has_failed:
+            self.has_failed = not all(r.passed for r in self._checks.judge_equal_scenarios(self._runs))
         return passed
 
     def _place(self, golden_run: GoldenRun, output_digest: str) -> None:
@@ -136,7 +143,7 @@ class ChecksBesideExperiments:
         pace = StagePace("checks", self.total, self.done)
         wake: SimpleQueue[None] = SimpleQueue()
         self.on_end = lambda: wake.put(None)
-        while self._waiting or self._running:
+        while self.has_remaining:
             notify(pace.progress_at(self.done))
             while self._waiting and self.running < max(1, self.workers):
                 self.start_next()

@@ -300,9 +300,9 @@ class PreflightChecks:
     def _judge_goldens(self, runs: CheckRunByName) -> Iterator[CheckResult]:
         for key in self.golden_runs:
             yield from golden_run_results(runs, key)
-        yield from self._judge_equal_scenarios(runs)
+        yield from self.judge_equal_scenarios(runs)
 
-    def _judge_equal_scenarios(self, runs: CheckRunByName) -> Iterator[CheckResult]:
+    def judge_equal_scenarios(self, runs: CheckRunByName) -> Iterator[CheckResult]:
         """Check that scenarios which a change makes equal, according to the manifest, give the same bytes."""
         equal_runs: dict[GoldenRun, dict[str, CheckRun]] = {}
         for golden_run in self.golden_runs:
