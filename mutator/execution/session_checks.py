@@ -100,7 +100,7 @@ class SessionChecks:
         checks = self.beside
         if checks is None or not checks.has_remaining:
             return ""
-        return f"provisional: {checks.done} of {checks.total} checks done"
+        return f"provisional: {checks.ended_count} of {checks.total} checks done"
 
     def _warn_of_unreached_triggers(self, folder: RunFolder) -> None:
         for remark in describe_unreached_triggers(self._workspace, folder):

@@ -75,7 +75,7 @@ class ChecksBesideExperiments:
         self._ended: SimpleQueue[tuple[tuple[str, Any], Future[Any]]] = SimpleQueue()
 
     @property
-    def done(self) -> int:
+    def ended_count(self) -> int:
         """The number of runs that have ended."""
         return self.total - len(self._waiting) - len(self._running)
 
@@ -140,11 +140,11 @@ class ChecksBesideExperiments:
 
     def _complete(self, notify: OnProgress) -> None:
         self.collect()
-        pace = StagePace("checks", self.total, self.done)
+        pace = StagePace("checks", self.total, self.ended_count)
         wake: SimpleQueue[None] = SimpleQueue()
         self.on_end = lambda: wake.put(None)
         while self.has_remaining:
-            notify(pace.progress_at(self.done))
+            notify(pace.progress_at(self.ended_count))
             while self._waiting and self.running < max(1, self.workers):
                 self.start_next()
             if self._ended.empty():
