@@ -38,6 +38,7 @@ from mutator.cli import (
     stpa_command,
     try_diff_generate_commands,
     verify_and_seal_commands,
+    watch_command,
 )
 from mutator.cli.shared_options import Library, Root, Sandbox, Target, Templates, WorkspaceOptions
 from mutator.cli.subcommand_help import NamedValuesCommand
@@ -66,7 +67,7 @@ SUBCOMMAND_GROUPS = (
     ("Look around", ("list", "places", "init", "import", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
     ("Before a campaign", ("review",)),
-    ("Campaigns", ("plan", "run", "merge", "report", "clean")),
+    ("Campaigns", ("plan", "run", "watch", "merge", "report", "clean")),
     ("After a campaign", ("compare", "export", "verify", "seal")),
     ("One experiment", ("show", "rerun")),
     ("In a browser", ("serve",)),
@@ -140,6 +141,7 @@ for module in (
     try_diff_generate_commands,
     review_command,
     plan_and_run_commands,
+    watch_command,
     merge_report_clean_commands,
     verify_and_seal_commands,
     compare_command,

@@ -23,6 +23,7 @@ from mutator.execution.bench_calls import BenchCalls
 from mutator.execution.bench_crew import BenchCrew, CrewBatch
 from mutator.execution.bench_progress import BenchProgress
 from mutator.execution.distributed_crew import DistributedCrew
+from mutator.execution.earlier_benches import EarlierBenches
 from mutator.execution.session import Session
 from mutator.execution.session_summary import Summary
 from mutator.execution.worker import WorkerStart
@@ -60,7 +61,9 @@ class Bench:
         notify: ProgressCallback = lambda progress: None,
         reuse: bool = True,
         distributor: "Distributor | None" = None,
+        earlier: EarlierBenches | None = None,
     ) -> None:
+        self._earlier = earlier or EarlierBenches()
         self.path = path.resolve()
         self.calls = BenchCalls(self.path)
         self._workspace, self._manifest = workspace, manifest
@@ -70,7 +73,14 @@ class Bench:
         self._batch_check = BatchCheck(workspace, manifest, campaign)
         self._plan = GrowingPlan(workspace, manifest, campaign, canary, self.path)
         self._checks = BenchChecks(
-            workspace, manifest, campaign, canary, self.path / "work", workers=workers, notify=notify
+            workspace,
+            manifest,
+            campaign,
+            canary,
+            self.path / "work",
+            workers=workers,
+            notify=notify,
+            passed_goldens=self._earlier.passed_goldens,
         )
         self._stored_records: Mapping[str, Record] = {}
         self._new_records: dict[str, Record] = {}
@@ -241,6 +251,7 @@ class Bench:
             engine=self._requested_engine,
             notify=self._progress.notify,
             reuse=self._is_reuse_wanted,
+            earlier=self._earlier.session_use,
         )
 
     def _read_records(self) -> None:

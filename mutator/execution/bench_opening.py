@@ -17,6 +17,7 @@ from mutator.campaigns.run_provenance import accepted_version_differences, check
 from mutator.errors import MutatorError
 from mutator.execution.bench import Bench
 from mutator.execution.distributor_choice import Distributor
+from mutator.execution.earlier_benches import EarlierBenches
 from mutator.execution.watched_progress import writing_progress
 from mutator.store import file_digests
 from mutator.store.appended_files import undo_unfinished_growth
@@ -36,16 +37,19 @@ def opened_bench(
     engine: str | None = None,
     reuse: bool = True,
     distributor: Distributor | None = None,
+    earlier: EarlierBenches | None = None,
+    notify: ProgressCallback | None = None,
 ) -> Iterator[Bench]:
     """Lock the run folder `out`, and open the bench in it or begin one. The caller finishes what it plans.
 
-    `values` are those of `bench_files.BenchModel`; `distributor` deals to a cluster, if not None.
+    `values` are those of `bench_files.BenchModel`; `distributor` deals to a cluster, if not None. `earlier`
+    has what other benches of this process leave to this one.
     """
     is_new = not out.exists()
     make_run_folder(out)
     with lock_run_folder(out):
         try:
-            with writing_progress(out, None) as progress:
+            with writing_progress(out, notify) as progress:
                 yield _build_bench(
                     workspace,
                     out,
@@ -54,6 +58,7 @@ def opened_bench(
                     engine=engine,
                     reuse=reuse,
                     distributor=distributor,
+                    earlier=earlier,
                     notify=progress.notify,
                 )
         finally:
@@ -85,6 +90,7 @@ def _build_bench(
     engine: str | None,
     reuse: bool,
     distributor: Distributor | None,
+    earlier: EarlierBenches | None,
     notify: ProgressCallback,
 ) -> Bench:
     file_bytes = bench_file_bytes(values)
@@ -107,6 +113,7 @@ def _build_bench(
         engine=engine,
         reuse=reuse,
         distributor=distributor,
+        earlier=earlier,
         notify=notify,
     )
 

@@ -3,7 +3,7 @@
 import sys
 from collections import Counter
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator.engines.engine_jobs import RunMode
@@ -13,7 +13,10 @@ from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 
 _MOST_LISTED_REASONS = 3
-_FIRST_VERSION = (3, 12)  # of Python, with `sys.monitoring`
+CAN_RECORD_CODE = sys.version_info >= (3, 12)  # with `sys.monitoring`
+NO_RECORDING_TEXT = (
+    f"Python {sys.version_info[0]}.{sys.version_info[1]} cannot tell what a run executes, as Python 3.12 can"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,10 +24,12 @@ class EarlierRunUse:
     """What a session does with an earlier run: leave out what a change cannot affect, run what failed there.
 
     `since` is the earlier run, if there is one; otherwise, what failed is what failed in the own folder.
+    `unproved_records` is as in `ReuseAssignment`.
     """
 
     since: RunFolder | None = None
     last_failed: bool = False
+    unproved_records: Mapping[str, str] = field(default_factory=dict)
 
     def check_target(self, folder: RunFolder) -> None:
         """Raise MutatorError if the earlier run has another target than the folder."""
@@ -73,9 +78,8 @@ def describe_left_out(earlier_run: Path, left_out: int, reasons: Mapping[str, in
     """Return a sentence on what `--since` left out, and why the others ran."""
     count = left_out + sum(reasons.values())
     text = f"since {earlier_run.name}: {left_out:,} of {count:,} left out"
-    if sys.version_info < _FIRST_VERSION:
-        version = f"{sys.version_info[0]}.{sys.version_info[1]}"
-        return f"{text}: Python {version} cannot tell what a run executes, as Python 3.12 can"
+    if not CAN_RECORD_CODE:
+        return f"{text}: {NO_RECORDING_TEXT}"
     text += ", because nothing that they executed has changed" if left_out else ""
     listed = sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
     texts = [f"{reason} ({number:,})" for reason, number in listed[:_MOST_LISTED_REASONS]]

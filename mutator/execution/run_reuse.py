@@ -3,7 +3,8 @@
 import builtins
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import RunMode
@@ -15,6 +16,7 @@ from mutator.execution.loaded_packages import LoadedPackages
 from mutator.model import Experiment, Record, RunError, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.store.finished_run_store import FinishedRun, FinishedRuns, UnprovedRuns
+from mutator.store.records import record_as_json
 from mutator.store.run_folder import RunFolder
 
 # not in the middle of a word, as in `km/h`; often the path of the scenario's file
@@ -29,12 +31,15 @@ class ReuseAssignment:
     * `harness`: the digest of the harness's code in it. A worker with other code leaves the store alone.
     * `searches`: whether it takes runs from the store; if not, it only notes runs
     * `version_by_package`: all installed packages whose version tells what their code is
+    * `unproved_records`: digests, by experiment, of records whose runs an earlier session in this folder
+      noted but could not prove. The proof of this session covers them.
     """
 
     surroundings: str
     harness: str
     searches: bool
     version_by_package: Mapping[str, str | None]
+    unproved_records: Mapping[str, str] = field(default_factory=dict)
 
 
 class RunReuse:
@@ -56,6 +61,7 @@ class RunReuse:
         self._golden_digest_of = golden_digest_of
         self._stored = FinishedRuns()
         self._unproved = UnprovedRuns(folder.path, folder.head.plan_of_lines, worker_name)
+        self._unproved_records = assignment.unproved_records
 
     def find(self, experiment: Experiment, mutant: Mutant) -> CopiedRun | None:
         """Return the stored run of an experiment; None if it must run."""
@@ -72,8 +78,9 @@ class RunReuse:
                 and self.packages.have_versions(run.packages)
             )
 
-        run = self._stored.find(self._key_of(experiment, mutant), is_usable)
-        if run is None:
+        key = self._key_of(experiment, mutant)
+        run = self._stored.find(key, is_usable) or self._earlier_unproved.get(key)
+        if run is None or not is_usable(run):
             return None
         return CopiedRun(
             record=run.record,
@@ -82,6 +89,19 @@ class RunReuse:
             executed_functions=executed_functions_from_json(run.executed),
             packages=run.packages,
         )
+
+    @cached_property
+    def _earlier_unproved(self) -> Mapping[str, FinishedRun]:
+        """Runs that an earlier session noted, by key. A mutant can write to the cache, so each must have the
+        record that the session received.
+        """
+        if not self._unproved_records:
+            return {}
+        return {
+            key: run
+            for key, run in self._unproved
+            if self._unproved_records.get(run.record.experiment_id) == digest(record_as_json(run.record))
+        }
 
     def note(self, finished: RecordedExperiment) -> None:
         """Note what a run gave, for the store."""

@@ -89,15 +89,15 @@ class Session:
         self.pending: tuple[PendingChunk, ...] = ()
         self.proof: tuple[equivalence_check.SampledExperiment, ...] = ()
         self.manifest = workspace.manifest(folder.head.target)
+        self._earlier = earlier or EarlierRunUse()
+        self._earlier.check_target(folder)
         self.engine = choose_engine(engine, self.manifest)
         self._not_forked = "" if engine else reason_not_forkable(self.manifest)
         self.reuse = (
-            SessionReuse(workspace, self.manifest, requested_engine=engine, engine=self.engine)
+            SessionReuse(workspace, self.manifest, self._earlier, requested_engine=engine, engine=self.engine)
             if reuse
             else None
         )
-        self._earlier = earlier or EarlierRunUse()
-        self._earlier.check_target(folder)
         self._unselected_count = 0  # experiments without a record that are left for another session
         self.worker_prefix = self._new_worker_prefix()  # of the names of this session's workers
         self.problem = ""

@@ -8,6 +8,7 @@ from functools import cached_property
 from mutator.campaigns import run_environment, shared_runs
 from mutator.engines.engine_jobs import RunMode
 from mutator.engines.engine_kinds import REFERENCE
+from mutator.execution.earlier_run import EarlierRunUse
 from mutator.execution.finished_run_keys import harness_digest, run_key, surroundings_digest
 from mutator.execution.run_reuse import ReuseAssignment, is_storable
 from mutator.model import Experiment, Record, Status
@@ -24,10 +25,17 @@ class SessionReuse:
     """The store as a session uses it that runs on `engine`. `requested_engine` is what the user asked for."""
 
     def __init__(
-        self, workspace: Workspace, manifest: TargetManifest, *, requested_engine: str | None, engine: str
+        self,
+        workspace: Workspace,
+        manifest: TargetManifest,
+        earlier: EarlierRunUse,
+        *,
+        requested_engine: str | None,
+        engine: str,
     ) -> None:
         self._workspace, self._manifest = workspace, manifest
         self._requested_engine, self._engine = requested_engine, engine
+        self._earlier = earlier
 
     @cached_property
     def searches(self) -> bool:
@@ -44,6 +52,7 @@ class SessionReuse:
             harness=harness_digest(),
             searches=self.searches,
             version_by_package=run_environment.versions_of_fixed_packages(),
+            unproved_records=self._earlier.unproved_records,
         )
 
     def store_proved_runs(self, folder: RunFolder, records: Mapping[str, Record]) -> None:

@@ -84,6 +84,8 @@ class BenchChecks:
     scratch_folder: Path
     workers: int = 1
     notify: ProgressCallback = lambda progress: None
+    # by its place in the cache, what passed in this process; benches that follow each other share it
+    passed_goldens: dict[Path, CheckedGolden] = field(default_factory=dict)
     goldens: dict[GoldenRun, CheckedGolden] = field(default_factory=dict)
     _stored: set[GoldenRun] = field(default_factory=set)  # which of them are in the run folder
     _variants: set[str] = field(default_factory=set)
@@ -140,7 +142,8 @@ class BenchChecks:
         if not new:
             return ()
         remove_folder(self.pending_folder)
-        failed = [] if all(map(self._take_from_cache, new)) else self._run_checks(new)
+        unchecked = [golden_run for golden_run in new if not self._take_from_cache(golden_run)]
+        failed = self._run_checks(unchecked) if unchecked else []
         failed += [result for result in self._equal_scenario_results(golden_runs) if not result.passed]
         failed += self._changed_golden_results(new)
         if failed:
@@ -157,6 +160,8 @@ class BenchChecks:
         """Run what is needed; note what passed, and return what failed."""
         canary_golden = self._canary_golden
         runner = self._runner(new, canary=self.canary if canary_golden in new else None)
+        # a folder of its own, which the runner empties: the other one can have golden runs from the cache
+        runner = replace(runner, pending_folder=self.scratch_folder / "checked")
         runs, verdict = runner.run_all(self.workers, self.notify)
         canary = build_check_result("canary", verdict.problem, verdict.success) if verdict else None
         for golden_run in new:
@@ -174,8 +179,16 @@ class BenchChecks:
         failed = [result for result in (*results, *([canary] if canary else [])) if not result.passed]
         if not failed:
             for golden_run in new:
+                self._move_to_pending(
+                    path_below(runner.pending_folder / "golden", golden_run.key), golden_run
+                )
                 self._store_in_cache(golden_run)
         return failed
+
+    def _move_to_pending(self, source: Path, golden_run: GoldenRun) -> None:
+        destination = path_below(self.pending_folder / "golden", golden_run.key)
+        destination.parent.mkdir(parents=True, exist_ok=True)
+        source.rename(destination)
 
     def _changed_golden_results(self, new: Iterable[GoldenRun]) -> Iterator[CheckResult]:
         """Yield a failed check for each golden run that differs from the one the bench began with."""
@@ -277,20 +290,23 @@ class BenchChecks:
         return preflight_cache.cached_checks_path(digest([*facts, _environment_digest()]))
 
     def _store_in_cache(self, golden_run: GoldenRun) -> None:
+        path = self._cached_path(golden_run)
+
         def fill(entry: Path) -> None:
             shutil.copytree(path_below(self.pending_folder / "golden", golden_run.key), entry / "golden")
             facts = {"schema": _CACHED_FACTS_SCHEMA, **self.goldens[golden_run].as_json()}
             write_atomic(entry / _CACHED_FACTS_FILE, json_bytes(facts))
 
-        cached_folders.store_in_cache(self._cached_path(golden_run), fill)
+        cached_folders.store_in_cache(path, fill)
+        self.passed_goldens[path] = self.goldens[golden_run]
 
     def _take_from_cache(self, golden_run: GoldenRun) -> bool:
         """Take over checks that passed before on this machine. The null mutant runs again, whose output must
-        be the golden run's, because a mutant can write to the cache.
+        be the golden run's, because a mutant can write to the cache, unless this process remembers the run.
         """
-        copy = self.scratch_folder / "cached"
+        copy, path = self.scratch_folder / "cached", self._cached_path(golden_run)
         try:
-            cached_folders.copy_from_cache(self._cached_path(golden_run), copy)
+            cached_folders.copy_from_cache(path, copy)
             facts = read_json(copy / _CACHED_FACTS_FILE, _CACHED_FACTS_SCHEMA)
             facts.pop("schema")
             golden = CheckedGolden.from_json(facts)
@@ -298,14 +314,14 @@ class BenchChecks:
             return False  # missing or damaged
         if not all(result.passed for result in golden.results):
             return False
-        again = replace(self._runner([golden_run], None), pending_folder=self.scratch_folder / "again")
         digests = {output_digest_of(self.manifest, copy / "golden"), golden.output_digest}
-        if digests.union(again.repeat_goldens(1, self.notify).values()) != {golden.output_digest}:
+        if self.passed_goldens.get(path) != golden:
+            again = replace(self._runner([golden_run], None), pending_folder=self.scratch_folder / "again")
+            digests.update(again.repeat_goldens(1, self.notify).values())
+        if digests != {golden.output_digest}:
             return False  # forged, or no longer true
-        destination = path_below(self.pending_folder / "golden", golden_run.key)
-        destination.parent.mkdir(parents=True, exist_ok=True)
-        (copy / "golden").rename(destination)
-        self.goldens[golden_run] = golden
+        self._move_to_pending(copy / "golden", golden_run)
+        self.goldens[golden_run] = self.passed_goldens[path] = golden
         return True
 
 

@@ -9,6 +9,7 @@ from urllib.parse import quote
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
+from mutator._common.folder_locks import is_owner_alive
 from mutator.errors import MutatorError, NotServed
 from mutator.report.lone_experiment_data import ViewedTarget, experiment_view_data
 from mutator.results.finished_experiments_and_columns import FinishedExperiment
@@ -26,6 +27,11 @@ from mutator.workspace import Workspace
 _STATE_WHILE_PLANNING = {"state": RUNNING, "stage": "plan", "rows": [], "version": 0, "planned": 0, "done": 0}
 
 
+def _is_pass_of_watch(run: Path) -> bool:
+    """Whether `mutator watch` is at work, which puts another run in this place after the next edit."""
+    return is_owner_alive(run.parent)
+
+
 class WatchPages:
     def __init__(self, workspace: Workspace, runs: ServedRuns, jobs: ServeJobs, tokens: PageTokens) -> None:
         self._workspace, self._runs, self._jobs, self._tokens = workspace, runs, jobs, tokens
@@ -33,10 +39,13 @@ class WatchPages:
         self._trials = ServedTrials(workspace)
 
     def live_html(self, request: Request) -> Response:
-        """Send the page that watches a run; a run that is finished has its report instead."""
+        """Send the page that watches a run; a run that is finished, and followed by no other, has its report
+        instead.
+        """
         key = request.path_params["run"]
         path = self._runs.folders_by_key().get(key)
-        if path is not None and state_of_run(RunFolder.open_unverified(path)).state == FINISHED:
+        is_over = path is not None and state_of_run(RunFolder.open_unverified(path)).state == FINISHED
+        if path is not None and is_over and not _is_pass_of_watch(path):
             return RedirectResponse(report_address(key))
         if path is None and (path := self._folder_before_plan(key)) is None:
             self._runs.folder(key)  # raises NotServed
@@ -60,6 +69,7 @@ class WatchPages:
             facts["report"] = report_address(key)
         facts |= state_as_json(run_state) | self._watched.poll(folder, seen_version)
         facts |= {"campaign": folder.head.campaign, "target": folder.head.target}
+        facts["is_followed"] = _is_pass_of_watch(path)
         return JSONResponse(facts)
 
     def live_experiment_html(self, request: Request) -> Response:

@@ -11,7 +11,7 @@
   const STAGES = { plan: "planning", checks: "checks", golden: "golden runs", experiments: "experiments", proof: "proof", tables: "tables" };
   const COUNTED = ["checks", "golden", "proof"]; // stages whose steps are not experiments
   const stages = new Map(Object.entries(STAGES).map(([name, title]) => [name, el("li", {}, title)]));
-  const rows = new Map(); // experiment id -> row
+  const rows = new Map(); // experiment and how it ended -> row
   const counters = new Map(); // name -> the element with the number
   const find = (id) => document.getElementById(id);
   const body = find("results").tBodies[0];
@@ -24,7 +24,7 @@
     try {
       const data = await Jobs.ask(`/api/runs/${base}/live?version=${version}`);
       show(data);
-      if (data.report) return;
+      if (data.report && !data.is_followed) return; // `mutator watch` puts the next run in the same place
       if (data.state === "running") pause = data.behind ? BEHIND_MS : SOON_MS;
     } catch (error) {
       set(find("state"), `No news: ${error.message}.`);
@@ -92,15 +92,18 @@
   /** Put the rows in order. A row stays the same element, so that its link keeps the focus. */
   function showRows(list) {
     find("results-scroll").hidden = list.length === 0;
-    const ids = new Set(list.map(({ id }) => id));
-    for (const [id, row] of rows) {
-      if (ids.has(id)) continue;
+    // in a run that takes this one's place, an experiment can end otherwise
+    const keyOf = ({ id, ending, sentence }) => `${id} ${ending} ${sentence}`;
+    const keys = new Set(list.map(keyOf));
+    for (const [key, row] of rows) {
+      if (keys.has(key)) continue;
       row.remove();
-      rows.delete(id);
+      rows.delete(key);
     }
     list.forEach((result, at) => {
-      if (!rows.has(result.id)) rows.set(result.id, rowOf(result));
-      const row = rows.get(result.id);
+      const key = keyOf(result);
+      if (!rows.has(key)) rows.set(key, rowOf(result));
+      const row = rows.get(key);
       set(row.cells[0], String(at + 1));
       if (body.children[at] !== row) body.insertBefore(row, body.children[at] || null);
     });

@@ -55,7 +55,7 @@ def executed(monkeypatch: pytest.MonkeyPatch) -> Callable[[ExecutedFunctions | N
         for engine in (fork_engine, reference_engine):
             monkeypatch.setattr(engine, "executed_functions_from_json", lambda data: functions)
 
-    monkeypatch.setattr(earlier_run, "_FIRST_VERSION", (3, 0))
+    monkeypatch.setattr(earlier_run, "CAN_RECORD_CODE", True)
     say(EXECUTED)
     return say
 

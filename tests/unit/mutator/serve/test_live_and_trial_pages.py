@@ -157,3 +157,11 @@ def test_a_trial_that_was_changed_is_refused(watching: Client, trial: str) -> No
     (folder / "trial.json").unlink()
     (folder / "trial.json").symlink_to("/etc/passwd")
     assert watching.get(f"/api/trials/{trial}").status == 400
+
+
+def test_the_live_page_of_a_pass_goes_on_while_mutator_watch_is_at_work(watching: Client) -> None:
+    """After the next edit, another run takes the place of this one."""
+    runs = watching.place / "runs"
+    assert watching.get("/api/runs/half/live?version=0").json["is_followed"] is False
+    with lock_run_folder(runs):
+        assert watching.get("/api/runs/half/live?version=0").json["is_followed"] is True

@@ -1,0 +1,136 @@
+"""`mutator watch` answers edits of every kind with the verdicts of a fresh run."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator.errors import EXIT_OK, EXIT_WRONG_INPUT
+from mutator.execution.watched_campaign import Verdict, verdict_of
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+_CAMPAIGN = """\
+schema: campaign/1
+name: desk
+about: What somebody works on.
+target: toycar
+scenarios: [A]
+faults:
+  - {spec: sensor/lane/shifted, values: 2}
+  - {spec: sensor/silence/*}
+methods: [guided]
+triggers: {list: [{at_s: 2.0}]}
+seed: 1
+canary: {spec: sensor/lane/shifted, scenario: A, hazard: H3, at_s: 1.0}
+limits: {cpu_s: 20, wall_s: 60, memory_mb: 1024, steps: 200}
+"""
+_END_OF_PASS = "all: "
+
+
+class Desk:
+    """`mutator watch` in a process of its own, and the files that it watches."""
+
+    def __init__(self, workspace: Workspace, place: Path) -> None:
+        self.workspace, self.place, self.out = workspace, place, place / "watch"
+        self.campaign = workspace.library / "campaigns" / "desk.yaml"
+        self.campaign.write_text(_CAMPAIGN)
+        command = [sys.executable, "-m", "mutator", "watch", "desk", "--out", str(self.out), "-n", "1"]
+        places = {"MUTATOR_LIBRARY": str(workspace.library), "MUTATOR_TEMPLATES": str(workspace.templates)}
+        self.process = subprocess.Popen(
+            command,
+            cwd=place,
+            env=os.environ | places | {"PYTHONUNBUFFERED": "1", "COLUMNS": "200"},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    def read_until(self, *texts: str) -> list[str]:
+        """Return the lines up to one that has one of the texts."""
+        lines = []
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            lines.append(line.rstrip())
+            if any(text in line for text in texts):
+                return lines
+        raise AssertionError("\n".join(lines))
+
+    def edit(self, name: str, old: str, new: str) -> None:
+        """Edit a file below the library's parent as editors do: write another one, and rename it."""
+        path = self.workspace.library.parent / name
+        text = path.read_text()
+        assert old in text
+        temporary = path.with_name(f".{path.name}.swp")
+        temporary.write_text(text.replace(old, new, 1))
+        temporary.rename(path)
+
+    def verdicts(self) -> dict[str, Verdict]:
+        folder = RunFolder.open(self.out / "now")
+        assert folder.is_finished
+        return {name: verdict_of(record) for name, record in folder.records().items()}
+
+    def fresh_verdicts(self) -> dict[str, Verdict]:
+        out = self.place / f"fresh{len(list(self.place.glob('fresh*')))}"
+        run = mutator.run(self.campaign, out, engine="reference", reuse=False, workspace=self.workspace)
+        return {name: verdict_of(record) for name, record in run.folder.records().items()}
+
+    def end(self) -> int:
+        self.process.send_signal(signal.SIGINT)
+        self.process.communicate()
+        return self.process.returncode
+
+
+@pytest.fixture
+def desk(tmp_path: Path, toycar: Workspace) -> Iterator[Desk]:
+    desk = Desk(toycar, tmp_path)
+    yield desk
+    desk.process.kill()
+    desk.process.wait()
+    assert desk.process.stdout is not None
+    desk.process.stdout.close()
+
+
+def test_edits_of_each_kind_end_in_the_verdicts_of_a_fresh_run(desk: Desk) -> None:
+    """A mistake in a spec, its correction, another spec, the campaign, a scenario and the target."""
+    first = desk.read_until(_END_OF_PASS)
+    assert any("hazard H3: sensor/lane/shifted" in line for line in first)
+    assert desk.verdicts() == desk.fresh_verdicts()
+    spec = "fault_library/faults/sensor/lane.yaml"
+    desk.edit(spec, "schema:", "schema: [")
+    lines = desk.read_until("waiting for the next edit")
+    assert any(f"{spec}:" in line for line in lines), lines
+    desk.edit(spec, "schema: [", "schema:")
+    assert "nothing that this campaign runs has changed" in desk.read_until("nothing that")[-1]
+    desk.edit("fault_library/campaigns/desk.yaml", "at_s: 2.0", "at_s: 2.5")
+    lines = desk.read_until(_END_OF_PASS)
+    assert lines[-1].startswith("new or changed: ")
+    assert desk.verdicts() == desk.fresh_verdicts()
+    desk.edit("tree/toycar/driver.py", "\n", "\nUNUSED = 1\n")
+    lines = desk.read_until(_END_OF_PASS)
+    assert lines[-1].startswith("unchanged: ")
+    assert desk.verdicts() == desk.fresh_verdicts()
+    assert desk.end() == EXIT_OK
+    assert {path.name for path in desk.out.iterdir()} == {"now", "before", "owner.lock"}
+
+
+def test_a_refused_edit_decides_the_exit_code(desk: Desk) -> None:
+    """Ctrl-C after a mistake that was not corrected ends with the code of wrong input."""
+    desk.read_until(_END_OF_PASS)
+    desk.edit("fault_library/campaigns/desk.yaml", "scenarios: [A]", "scenarios: [C]")
+    desk.read_until("waiting for the next edit")
+    assert desk.end() == EXIT_WRONG_INPUT
+
+
+def test_an_edit_during_a_pass_begins_it_again(desk: Desk) -> None:
+    """Its verdicts are those of the new files."""
+    desk.read_until("watching desk")
+    desk.edit("fault_library/campaigns/desk.yaml", "at_s: 2.0", "at_s: 3.0")
+    lines = desk.read_until(_END_OF_PASS)
+    assert any("which begins again" in line for line in lines), lines
+    assert desk.verdicts() == desk.fresh_verdicts()
