@@ -1,8 +1,9 @@
 """README and docs show what the commands print, and their links work.
 
-The test follows a page as a reader does: it runs the commands in order, writes a block after a line with a
-file name (`` `late.yaml`: ``) to that file, and applies diffs. If your change alters the output, write it
-into the pages with `UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py`, and read the difference.
+The test follows a page as a reader does: it runs the commands in order (`cd FOLDER`, as a command of its own,
+holds for those that follow), writes a block after a line with a file name (`` `late.yaml`: ``) to that file,
+and applies diffs. If your change alters the output, write it into the pages with
+`UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py`, and read the difference.
 """
 
 import json
@@ -120,6 +121,8 @@ def work_through(page: Path, folder: Path) -> list[tuple[str, str]]:
     for what, text in steps(page):
         if isinstance(text, list):
             printed.append((what, run(what, folder)))
+            if what.startswith("cd "):
+                folder /= what.removeprefix("cd ")
         elif what:
             (folder / what).parent.mkdir(parents=True, exist_ok=True)
             (folder / what).write_text(text, encoding="utf-8")
