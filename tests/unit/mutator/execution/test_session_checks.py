@@ -1,6 +1,7 @@
 """Checks beside experiments: what has passed decides what runs, and a failed check leaves no result."""
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,15 +27,19 @@ def edit(toycar: Workspace, file: str, old: str, new: str) -> None:
 
 
 @pytest.fixture
-def late_checks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the canary and the runs of A+alone wait until experiments of A have records."""
+def late_checks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Callable[[], bool]]:
+    """Let the canary and the runs of A+alone wait until experiments of A have records, and until all
+    conditions hold that a test adds to the returned list.
+    """
+    conditions: list[Callable[[], bool]] = []
     run_job, judge_canary = CheckRunner.run_job, CheckRunner.judge_canary
 
     def wait_for_records() -> None:
         deadline = time.monotonic() + 120.0
         while time.monotonic() < deadline:
             files = [*tmp_path.glob("*/records/*.jsonl")]
-            if sum(len(file.read_bytes().splitlines()) - 1 for file in files) > 0:
+            count = sum(len(file.read_bytes().splitlines()) - 1 for file in files)
+            if count > 0 and all(holds() for holds in conditions):
                 return
             time.sleep(0.05)
 
@@ -49,6 +54,7 @@ def late_checks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(CheckRunner, "run_job", run_job_late)
     monkeypatch.setattr(CheckRunner, "judge_canary", judge_canary_late)
+    return conditions
 
 
 def result_files(out: Path) -> dict[str, bytes]:
@@ -57,13 +63,20 @@ def result_files(out: Path) -> dict[str, bytes]:
     return {path.relative_to(out).as_posix(): path.read_bytes() for path in files if "json" not in path.name}
 
 
-@pytest.mark.usefixtures("late_checks")
 def test_results_are_those_of_checks_that_come_first(
-    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    toycar: Workspace,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    late_checks: list[Callable[[], bool]],
 ) -> None:
     """The seal is the same, and while checks remain, the progress says that verdicts are provisional."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache1"))
     told: list[Progress] = []
+
+    def has_told_provisional_verdicts() -> bool:
+        return any("provisional: " in progress.detail and progress.done for progress in told)
+
+    late_checks.append(has_told_provisional_verdicts)
     beside = run_campaign(toycar, "small", tmp_path / "beside", workers=2, reuse=False, notify=told.append)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache2"))
     first = run_campaign(toycar, "small", tmp_path / "first", reuse=False)
@@ -71,8 +84,7 @@ def test_results_are_those_of_checks_that_come_first(
     assert beside.seals == first.seals
     assert beside.seals.seal is not None
     assert result_files(tmp_path / "beside") == result_files(tmp_path / "first")
-    provisional = [progress for progress in told if "provisional: " in progress.detail]
-    assert any(progress.stage == "experiments" and progress.done for progress in provisional)
+    assert has_told_provisional_verdicts()
 
 
 @pytest.mark.usefixtures("late_checks")
