@@ -1,4 +1,4 @@
-"""Thirty changes of the shipped controller, for `since.py`: refactorings, and changes of what it does."""
+"""Thirty changes of the shipped controller, for benchmarks: refactorings, and changes of what it does."""
 
 from dataclasses import dataclass
 from pathlib import Path
