@@ -99,6 +99,7 @@ class _WatchLoop:
     ) -> None:
         self._passes, self._edits, self._display, self._names_folder = passes, edits, display, names_folder
         self.exit_code = EXIT_OK  # of the last pass that ended, or could not begin
+        self._finished_exit_code = EXIT_OK
         self._has_passed = False
 
     def run(self) -> None:
@@ -129,6 +130,7 @@ class _WatchLoop:
     def _pass(self) -> None:
         planned = self._passes.plan()
         if self._passes.is_finished(planned):
+            self.exit_code = self._finished_exit_code
             self._display.nothing_affected()
             return
         self._display.begin_pass(planned, not self._has_passed)
@@ -145,9 +147,11 @@ class _WatchLoop:
             ]
             self._display.verdicts(VerdictChanges(new=verdicts, unchanged=len(records) - len(new)))
 
+        self._passes.make_room()
         with self._edits.interrupting():
             summary = self._passes.run(planned, show, self._display.progress)
         self._has_passed, self.exit_code = True, summary.exit_code
+        self._finished_exit_code = summary.exit_code
         self._display.end_pass(summary, len(before.keys() - by_id.keys()))
 
 

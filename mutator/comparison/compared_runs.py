@@ -13,6 +13,7 @@ from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import frame_of_experiments
 from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.store import plan_file
+from mutator.store.preflight_results import check_verdicts_are_final
 from mutator.store.run_folder import RunFolder
 from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN
@@ -60,9 +61,11 @@ class ComparedRun:
 def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
     """Read the run folder `run` and its experiments that match `only`, a filter over plan columns.
 
-    Raise MutatorError if `run` is not a run folder, and CheckFailed if its equivalence check failed.
+    Raise MutatorError if `run` is not a run folder, or has checks that did not pass, and CheckFailed if its
+    equivalence check failed.
     """
     folder = RunFolder.open(run)
+    check_verdicts_are_final(folder)
     records = folder.records()
     equivalence_check.compare_sample(folder, records)
     experiments = tuple(plan_file.load_experiments(folder.path))

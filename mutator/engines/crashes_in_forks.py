@@ -6,11 +6,11 @@ A forked run leaves a crash to the reference engine unless all of this holds:
 * a step of the run raised it while the fault had been active (not its end, which writes the results);
 * it and its causes are of classes that do not depend on the process (`in_target/crash_description.py`), and
   do not name a folder of the run, which differs;
-* the reference engine has rerun three crashes of the same classes in this session, and each time found the
-  same exception at the same place. If it finds another one, no crash of these classes is judged here.
+* the reference engine has rerun three crashes of the same classes, with the same message and at the same
+  place, in this session, and each time found the same. If it finds another one, no such crash is judged here.
 
-The last point covers the frames that only a fresh interpreter has: an entry module that catches some
-exceptions of its steps.
+The last point covers what only a fresh interpreter has: an entry module that catches some exceptions of its
+steps, and messages that tell something about the process, such as a name of its main module.
 """
 
 from dataclasses import dataclass
@@ -25,13 +25,15 @@ from mutator.engines.received_fork_output import ReceivedForkOutput
 from mutator.mutants.injected_line_syntax import mutated_line_of
 from mutator.mutants.probe_contract import is_probe_path
 
-NEEDED_CONFIRMATIONS = 3  # crashes of each class that the reference engine runs, too
-_SAME, _OTHER = b"same", b"other"  # what the reference engine gave
+NEEDED_CONFIRMATIONS = 3  # crashes of a kind that the reference engine runs, too
+_SAME, _OTHER = "same", "other"  # what the reference engine gave
 _MOST_FRAMES = 10_000
 
 
 class CrashClasses:
-    """The classes of crashes that the reference engine has confirmed, for all workers of a session."""
+    """The kinds of crashes that the reference engine has confirmed, for all workers of a session. Those of a
+    kind have the same classes, message and place.
+    """
 
     def __init__(self, files: AuthenticatedFiles) -> None:
         self._files = files
@@ -39,35 +41,33 @@ class CrashClasses:
 
     def is_confirmed(self, crash_class: str) -> bool:
         if crash_class not in self._confirmed:
-            answers = self._answers(crash_class)
-            if _OTHER in answers or len(answers) < NEEDED_CONFIRMATIONS:
+            if self._has(crash_class, _OTHER) or self._same_count(crash_class) < NEEDED_CONFIRMATIONS:
                 return False
             self._confirmed.add(crash_class)
         return True
 
     def note(self, crash_class: str, *, is_same: bool) -> None:
         """Note what the reference engine gave for a crash. Once it gave another result, that stays."""
-        number = len(self._answers(crash_class)) if is_same else 0
-        if number < NEEDED_CONFIRMATIONS and self._load(crash_class, number) != _OTHER:
-            self._files.save(_file_name(crash_class, number), _SAME if is_same else _OTHER)
         if not is_same:
             self._confirmed.discard(crash_class)
+            self._files.save(_file_name(crash_class, _OTHER), b"1")
+        elif (count := self._same_count(crash_class)) < NEEDED_CONFIRMATIONS:
+            self._files.save(_file_name(crash_class, f"{_SAME}-{count}"), b"1")
 
-    def _answers(self, crash_class: str) -> list[bytes]:
-        answers = (self._load(crash_class, number) for number in range(NEEDED_CONFIRMATIONS))
-        return [answer for answer in answers if answer]
+    def _same_count(self, crash_class: str) -> int:
+        return sum(self._has(crash_class, f"{_SAME}-{number}") for number in range(NEEDED_CONFIRMATIONS))
 
-    def _load(self, crash_class: str, number: int) -> bytes | None:
-        return self._files.load(_file_name(crash_class, number))
+    def _has(self, crash_class: str, answer: str) -> bool:
+        return self._files.load(_file_name(crash_class, answer)) is not None
 
 
-def _file_name(crash_class: str, number: int) -> str:
-    return f"crash-{crash_class}-{number}"
+def _file_name(crash_class: str, answer: str) -> str:
+    return f"crash-{crash_class}-{answer}"
 
 
 @dataclass(frozen=True, slots=True)
 class CrashOfFork:
-    """An exception, and the id of its classes and those of its causes."""
+    """An exception, and an id of its classes and those of its causes, its message and its place."""
 
     class_id: str
     exception: RaisedException
@@ -91,10 +91,12 @@ def judge_crash(
     try:
         stacks = [_stack_of_mutant(job, frames) for frames in crash["frames"]]
         raised = exception_in_report({"error": {**report["error"], "stacks": stacks}}, job)
-        class_id = content_id(crash["classes"])
+        if raised is None:
+            return None
+        class_id = content_id([crash["classes"], raised.message, raised.place])
     except (LookupError, TypeError, ValueError):  # a run can write anything to its report
         return None
-    return CrashOfFork(class_id, raised) if raised else None
+    return CrashOfFork(class_id, raised)
 
 
 def _stack_of_mutant(job: Job, frames: list[list[Any]]) -> TargetStack:

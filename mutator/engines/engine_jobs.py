@@ -111,7 +111,7 @@ class JobResult:
     * `was_fault_active`: whether an injection was active
     * `log_tail`: the tail of what the run printed
     * `fallback_reason`: why another engine executed the job
-    * `crash_class`: of a crash that was judged from its fork, the id of its exceptions' classes
+    * `crash_class`: of a crash that was judged from its fork, the id of its classes, message and place
     * `fork_step`: the step before which the run was forked
     * `was_stopped_at_hazard`: whether a terminal hazard ended the run early
     * `third_party_modules`: the third-party top-level modules that the run imported

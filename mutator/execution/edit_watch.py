@@ -43,6 +43,7 @@ class EditWatch:
     def wait(self) -> tuple[Path, ...]:
         """Wait for edits; return the files."""
         with self._changed:
+            self._is_interrupting = False  # also if the end of a block was interrupted
             self._wait_for(lambda: bool(self._edited))
             edited, self._edited, self.has_interrupted = tuple(self._edited), {}, False
             return edited
@@ -52,10 +53,10 @@ class EditWatch:
         """Interrupt the block, in the main thread, by SIGINT if there are edits: whatever can be interrupted
         by Ctrl-C can be interrupted so.
         """
-        with self._changed:
-            self._is_interrupting = True
-            self._interrupt_if_edited()
         try:
+            with self._changed:
+                self._is_interrupting = True
+                self._interrupt_if_edited()
             yield
         finally:
             with self._changed:

@@ -25,6 +25,7 @@ from mutator.store.checks_file import CHECKS_SCHEMA, measured_limits_as_json
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.packed_patches import PatchWriter
 from mutator.store.plain_contents_check import check_plain_contents
+from mutator.store.preflight_results import check_verdicts_are_final
 from mutator.store.recorded_approvals import APPROVALS_FILE as REVIEWED
 from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
@@ -151,6 +152,7 @@ def _check_shard_numbers(folders: Sequence[RunFolder]) -> None:
 
 
 def _check_shard_finished(folder: RunFolder) -> None:
+    check_verdicts_are_final(folder)
     records = folder.records()
     finished_count = sum(ending.is_final for ending in endings_of(records))
     if finished_count < folder.planned_experiment_count:

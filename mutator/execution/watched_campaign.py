@@ -91,12 +91,11 @@ class WatchedCampaign:
         on_records: Callable[[Sequence[Record]], None],
         notify: ProgressCallback | None = None,
     ) -> Summary:
-        """Run a pass, whose records are handed over in parts. After an interruption, the next pass goes on
-        with what has finished.
+        """Run a pass after `make_room`. Its records are handed over in parts. After an interruption, the next
+        pass goes on with what has finished.
 
         MutatorError for a mistake in the files, or if the bench fails; CheckFailed if a check does.
         """
-        self._make_room()
         self._earlier.since = self._run_before() if CAN_RECORD_CODE else None
         received: dict[str, Record] = {}
         try:
@@ -152,8 +151,9 @@ class WatchedCampaign:
     def _is_no_hazard(self, experiment: Experiment) -> bool:
         return self.verdicts[experiment.id][1] != Outcome.HAZARD.value
 
-    def _make_room(self) -> None:
-        """Make a finished run the one before, and delete one that was cut off."""
+    def make_room(self) -> None:
+        """Make a finished run the one before, and delete one that was cut off. Not to be interrupted."""
+        self._finished_inputs = ""  # `now` will be that of another pass
         if not RunFolder.exists(self.run_path):
             return
         if not RunFolder(self.run_path).is_finished:
@@ -161,6 +161,13 @@ class WatchedCampaign:
             return
         if RunFolder.exists(self._before_path):
             delete_run(self._before_path)
+        elif self._before_path.exists():
+            raise MutatorError(
+                "the rest of a run that was being deleted",
+                where=self._before_path,
+                expected="the run of the pass before, or no folder",
+                remedy="delete this folder",
+            )
         self.run_path.rename(self._before_path)
 
     def _run_before(self) -> RunFolder | None:

@@ -27,7 +27,7 @@ from mutator.results.table_columns import TIMING_COLUMNS, cells_by_column, resul
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import FileDigest
 from mutator.store.planned_experiments import PlannedExperiments
-from mutator.store.preflight_results import are_verdicts_provisional
+from mutator.store.preflight_results import check_verdicts_are_final
 from mutator.store.run_folder import RunFolder
 
 CSV_FILE, PARQUET_FILE, TIMINGS_FILE = "results.csv", "results.parquet", "timings.parquet"
@@ -53,13 +53,7 @@ def build_tables(run: Path) -> Path:
     not all checks of the run have passed.
     """
     folder = RunFolder.open(run)
-    if are_verdicts_provisional(folder):
-        raise MutatorError(
-            "its verdicts are provisional, because not all of its checks have passed",
-            where=folder.path,
-            expected="a run whose checks have passed",
-            remedy="run the same `mutator run` command again: it goes on, or says which check fails",
-        )
+    check_verdicts_are_final(folder)
     inputs_digest = _inputs_digest(folder)
     with ExitStack() as stack:
         # The stack exits in reverse order, so the first table is replaced first.

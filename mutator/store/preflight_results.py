@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from mutator._common.files import read_json
+from mutator.errors import MutatorError
 from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA, UNPACKAGED_MODULES_KEY
 from mutator.store.run_folder import RunFolder
 
@@ -29,6 +30,17 @@ def are_verdicts_provisional(folder: RunFolder) -> bool:
         return False
     has_checks = (folder.path / CHECKS_FILE).is_file()
     return not (has_checks and all(result.passed for result in check_results(folder)))
+
+
+def check_verdicts_are_final(folder: RunFolder) -> None:
+    """Raise MutatorError if the verdicts are provisional."""
+    if are_verdicts_provisional(folder):
+        raise MutatorError(
+            "its verdicts are provisional, because not all of its checks have passed",
+            where=folder.path,
+            expected="a run whose checks have passed",
+            remedy="run the same `mutator run` command again: it goes on, or says which check fails",
+        )
 
 
 def packages_loaded_by_golden_runs(folder: RunFolder) -> tuple[str, ...]:

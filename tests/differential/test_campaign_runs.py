@@ -61,7 +61,7 @@ def test_order_and_interruptions_change_no_byte(
     prepare, draw = Session.prepare, random.Random(3)
     taken: list[int] = []
 
-    def two_chunks(self: Session, packages: Iterable[str]) -> None:
+    def two_chunks(self: Session, packages: Iterable[str], *, checks_beside: bool) -> None:
         prepare(self, packages)
         self.pending = tuple(draw.sample(self.pending, min(2, len(self.pending))))
         taken.extend(item.chunk_index for item in self.pending)

@@ -127,6 +127,15 @@ def test_a_refused_edit_decides_the_exit_code(desk: Desk) -> None:
     assert desk.end() == EXIT_WRONG_INPUT
 
 
+def test_a_mistake_that_is_undone_leaves_the_exit_code_of_the_last_pass(desk: Desk) -> None:
+    desk.read_until(_END_OF_PASS)
+    desk.edit("fault_library/campaigns/desk.yaml", "scenarios: [A]", "scenarios: [C]")
+    desk.read_until("waiting for the next edit")
+    desk.edit("fault_library/campaigns/desk.yaml", "scenarios: [C]", "scenarios: [A]")
+    desk.read_until("nothing that this campaign runs has changed")
+    assert desk.end() == EXIT_OK
+
+
 def test_an_edit_during_a_pass_begins_it_again(desk: Desk) -> None:
     """Its verdicts are those of the new files."""
     desk.read_until("watching desk")

@@ -90,6 +90,16 @@ def test_what_a_fork_alone_does_not_show_is_left_to_the_reference_engine(
     assert judge(tmp_path, **changes) is None
 
 
+def test_crashes_of_a_kind_have_the_same_message_and_place(tmp_path: Path) -> None:
+    """A message can tell something about the process, and an entry module can catch by message."""
+    error = {"kind": "ZeroDivisionError", "message": "float division by zero", "stacks": [[]]}
+    frames = [["a.py", 5, 4, False], ["a.py", 5, 11, True]]
+    crash = {"classes": ["builtins.ZeroDivisionError"], "frames": [frames]}
+    judged = judge(tmp_path), judge(tmp_path), judge(tmp_path, error=error), judge(tmp_path, crash=crash)
+    same, again, *others = (each.class_id for each in judged)
+    assert same == again and same not in others
+
+
 def test_a_message_with_a_folder_of_the_run_is_left_to_the_reference_engine(tmp_path: Path) -> None:
     error = {"kind": "ZeroDivisionError", "message": f"no {tmp_path}/x", "stacks": [[]]}
     assert judge(tmp_path, error=error) is None

@@ -50,6 +50,24 @@ def test_an_edit_before_a_block_interrupts_it() -> None:
             time.sleep(10)
 
 
+def test_an_edit_before_a_block_interrupts_nothing_after_it() -> None:
+    """The next edit waits to be asked for, too."""
+    begun = threading.Event()
+
+    def find() -> Sequence[Path]:
+        return [A] if begun.is_set() and not begun.clear() else ()
+
+    with EditWatch(find, 0.01) as edits:
+        begun.set()
+        assert edits.settle()
+        with pytest.raises(KeyboardInterrupt), edits.interrupting():
+            time.sleep(10)
+        assert edits.wait() == (A,)
+        begun.set()
+        time.sleep(0.1)
+        assert edits.wait() == (A,)
+
+
 def test_without_edits_settling_says_so() -> None:
     """After a failure of a pass, it is known whether an edit was its reason."""
     with EditWatch(answers(), 0.01) as edits:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from mutator.comparison.compared_runs import load_compared_run
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session_checks import SessionChecks
@@ -131,6 +132,8 @@ def test_a_check_that_fails_after_experiments_began_leaves_no_result(
             run_campaign(toycar, "small", out, workers=2)
         folder = RunFolder.open(out)
         counts.append(len(folder.records()))
+        with pytest.raises(MutatorError, match="its verdicts are provisional"):
+            load_compared_run(out)
         assert not folder.is_finished
         assert not (out / "results.csv").exists()
         assert not FinishedRuns().has_any()

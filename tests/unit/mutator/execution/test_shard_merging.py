@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from mutator.errors import UnsafePath
+from mutator.errors import MutatorError, UnsafePath
 from mutator.execution.shard_merging import _merged_checks, merge_shards
 from mutator.model import Limits, MeasuredLimits
 from mutator.store import file_digests
@@ -35,6 +35,17 @@ def out(tmp_path: Path) -> Path:
 
 def test_a_single_shard_is_merged(shard: Path, out: Path) -> None:
     assert merge_shards([shard], out) == out / "results.csv"
+
+
+def test_a_shard_whose_check_failed_is_refused(shard: Path, out: Path) -> None:
+    """Its experiments can have run beside the check."""
+    path, ledger = shard / CHECKS_FILE, file_digests.load_ledger(shard)
+    failed = {"name": "canary", "passed": False, "detail": "did not reach H3"}
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"results": [failed]}))
+    digests = {**ledger.files, CHECKS_FILE: FileDigest.of_bytes(path.read_bytes())}
+    file_digests.save_ledger(shard, replace(ledger, files=digests))
+    with pytest.raises(MutatorError, match="provisional"):
+        merge_shards([shard], out)
 
 
 @pytest.mark.parametrize("name", ["../../setup.py", "golden/../../../setup.py", "setup.py"])
