@@ -15,7 +15,7 @@ import mutator
 from mutator import CheckFailed
 from mutator.audit.run_audit import run_audit_checks
 from mutator.campaigns import run_environment
-from mutator.engines import fork_engine, reference_engine
+from mutator.engines import fork_results, reference_engine
 from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.execution import earlier_run, unaffected_runs
 from mutator.execution.code_recording import CodeRecording, RecordingAssignment, executed_parts
@@ -52,7 +52,7 @@ def executed(monkeypatch: pytest.MonkeyPatch) -> Callable[[ExecutedFunctions | N
     """Say what runs execute, in any Python."""
 
     def say(functions: ExecutedFunctions | None) -> None:
-        for engine in (fork_engine, reference_engine):
+        for engine in (fork_results, reference_engine):
             monkeypatch.setattr(engine, "executed_functions_from_json", lambda data: functions)
 
     monkeypatch.setattr(earlier_run, "CAN_RECORD_CODE", True)
