@@ -53,7 +53,7 @@ from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment
 from mutator.store import file_digests
 from mutator.store.file_digests import FileDigest
-from mutator.store.preflight_results import golden_digests
+from mutator.store.preflight_results import are_verdicts_provisional, golden_digests
 from mutator.store.records import LINE_SCHEMA_BY_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
@@ -141,7 +141,8 @@ class Session:
             self.proof = tuple(
                 sample for sample in self.proof if sample.id in selected_ids or sample.id in records
             )
-        if pending_chunks or self.proof or not checks_and_goldens_exist(self.folder):
+        has_checks = checks_and_goldens_exist(self.folder) and not are_verdicts_provisional(self.folder)
+        if pending_chunks or self.proof or not has_checks:
             check_requirements(self.manifest)
             accepted_version_differences(self.folder, accept=self.accept_versions)
             self.checks.begin(self.folder, beside_experiments=checks_beside and bool(pending_chunks))

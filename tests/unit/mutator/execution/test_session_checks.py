@@ -27,6 +27,9 @@ def edit(toycar: Workspace, file: str, old: str, new: str) -> None:
     path.write_text(path.read_text().replace(old, new))
 
 
+MANY_WORKERS = 4  # those that wait for late checks, and one for experiments
+
+
 @pytest.fixture
 def late_checks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Callable[[], bool]]:
     """Let the canary and the runs of A+alone wait until experiments of A have records, and until all
@@ -78,7 +81,9 @@ def test_results_are_those_of_checks_that_come_first(
         return any("provisional: " in progress.detail and progress.done for progress in told)
 
     late_checks.append(has_told_provisional_verdicts)
-    beside = run_campaign(toycar, "small", tmp_path / "beside", workers=2, reuse=False, notify=told.append)
+    beside = run_campaign(
+        toycar, "small", tmp_path / "beside", workers=MANY_WORKERS, reuse=False, notify=told.append
+    )
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache2"))
     first = run_campaign(toycar, "small", tmp_path / "first", reuse=False)
     assert (beside.done, beside.exit_code) == (12, 0)
@@ -129,7 +134,7 @@ def test_a_check_that_fails_after_experiments_began_leaves_no_result(
     counts = []
     for _ in range(2):
         with pytest.raises(CheckFailed, match=problem.replace("+", r"\+")):
-            run_campaign(toycar, "small", out, workers=2)
+            run_campaign(toycar, "small", out, workers=MANY_WORKERS)
         folder = RunFolder.open(out)
         counts.append(len(folder.records()))
         with pytest.raises(MutatorError, match="its verdicts are provisional"):
