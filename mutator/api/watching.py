@@ -16,7 +16,7 @@ from mutator.execution.watched_campaign import (
     PlannedPass,
     Verdict,
     WatchedCampaign,
-    owning_folder,
+    lock_watch_folder,
     verdict_of,
 )
 from mutator.model import Experiment, Record
@@ -83,7 +83,7 @@ def watch_campaign(
     something else or is in use, and an engine that does not exist.
     """
     check_engine_is_offered(engine)
-    with owning_folder(folder):
+    with lock_watch_folder(folder):
         workspace.campaign(campaign)  # raises if there is none
         passes = WatchedCampaign(workspace, campaign, folder, choices=choices, workers=workers, engine=engine)
         with EditWatch(SourceEdits(workspace, campaign).find) as edits:

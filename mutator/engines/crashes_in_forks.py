@@ -1,4 +1,4 @@
-"""Judges crashes of forks without a second run, if the reference engine has confirmed their classes.
+"""Judges crashes of forks without a second run, if the reference engine has confirmed others of their kind.
 
 A forked run leaves a crash to the reference engine unless all of this holds:
 
@@ -30,7 +30,7 @@ _SAME, _OTHER = "same", "other"  # what the reference engine gave
 _MOST_FRAMES = 10_000
 
 
-class CrashClasses:
+class CrashKinds:
     """The kinds of crashes that the reference engine has confirmed, for all workers of a session. Those of a
     kind have the same classes, message and place.
     """
@@ -39,37 +39,37 @@ class CrashClasses:
         self._files = files
         self._confirmed: set[str] = set()
 
-    def is_confirmed(self, crash_class: str) -> bool:
-        if crash_class not in self._confirmed:
-            if self._has(crash_class, _OTHER) or self._same_count(crash_class) < NEEDED_CONFIRMATIONS:
+    def is_confirmed(self, crash_kind: str) -> bool:
+        if crash_kind not in self._confirmed:
+            if self._has(crash_kind, _OTHER) or self._same_count(crash_kind) < NEEDED_CONFIRMATIONS:
                 return False
-            self._confirmed.add(crash_class)
+            self._confirmed.add(crash_kind)
         return True
 
-    def note(self, crash_class: str, *, is_same: bool) -> None:
+    def note(self, crash_kind: str, *, is_same: bool) -> None:
         """Note what the reference engine gave for a crash. Once it gave another result, that stays."""
         if not is_same:
-            self._confirmed.discard(crash_class)
-            self._files.save(_file_name(crash_class, _OTHER), b"1")
-        elif (count := self._same_count(crash_class)) < NEEDED_CONFIRMATIONS:
-            self._files.save(_file_name(crash_class, f"{_SAME}-{count}"), b"1")
+            self._confirmed.discard(crash_kind)
+            self._files.save(_file_name(crash_kind, _OTHER), b"1")
+        elif (count := self._same_count(crash_kind)) < NEEDED_CONFIRMATIONS:
+            self._files.save(_file_name(crash_kind, f"{_SAME}-{count}"), b"1")
 
-    def _same_count(self, crash_class: str) -> int:
-        return sum(self._has(crash_class, f"{_SAME}-{number}") for number in range(NEEDED_CONFIRMATIONS))
+    def _same_count(self, crash_kind: str) -> int:
+        return sum(self._has(crash_kind, f"{_SAME}-{number}") for number in range(NEEDED_CONFIRMATIONS))
 
-    def _has(self, crash_class: str, answer: str) -> bool:
-        return self._files.load(_file_name(crash_class, answer)) is not None
+    def _has(self, crash_kind: str, answer: str) -> bool:
+        return self._files.load(_file_name(crash_kind, answer)) is not None
 
 
-def _file_name(crash_class: str, answer: str) -> str:
-    return f"crash-{crash_class}-{answer}"
+def _file_name(crash_kind: str, answer: str) -> str:
+    return f"crash-{crash_kind}-{answer}"
 
 
 @dataclass(frozen=True, slots=True)
 class CrashOfFork:
     """An exception, and an id of its classes and those of its causes, its message and its place."""
 
-    class_id: str
+    kind_id: str
     exception: RaisedException
 
 
@@ -93,10 +93,10 @@ def judge_crash(
         raised = exception_in_report({"error": {**report["error"], "stacks": stacks}}, job)
         if raised is None:
             return None
-        class_id = content_id([crash["classes"], raised.message, raised.place])
+        kind_id = content_id([crash["classes"], raised.message, raised.place])
     except (LookupError, TypeError, ValueError):  # a run can write anything to its report
         return None
-    return CrashOfFork(class_id, raised)
+    return CrashOfFork(kind_id, raised)
 
 
 def _stack_of_mutant(job: Job, frames: list[list[Any]]) -> TargetStack:

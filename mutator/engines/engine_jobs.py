@@ -111,7 +111,7 @@ class JobResult:
     * `was_fault_active`: whether an injection was active
     * `log_tail`: the tail of what the run printed
     * `fallback_reason`: why another engine executed the job
-    * `crash_class`: of a crash that was judged from its fork, the id of its classes, message and place
+    * `crash_kind`: of a crash that was judged from its fork, the id of its kind
     * `fork_step`: the step before which the run was forked
     * `was_stopped_at_hazard`: whether a terminal hazard ended the run early
     * `third_party_modules`: the third-party top-level modules that the run imported
@@ -131,7 +131,7 @@ class JobResult:
     log_tail: str = ""
     mode: RunMode = RunMode.REFERENCE
     fallback_reason: str = ""
-    crash_class: str = ""
+    crash_kind: str = ""
     fork_step: int = 0
     was_stopped_at_hazard: bool = False
     third_party_modules: tuple[str, ...] = ()

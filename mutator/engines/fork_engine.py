@@ -1,7 +1,7 @@
 """The fork engine: each mutant is a fork of its golden run, made just before the fault is first active.
 
 Results equal the reference engine's byte for byte. The reference engine runs mutants that cannot be forked,
-and reruns those that crash, but for crashes of confirmed classes (`crashes_in_forks`). The `warm` engine
+and reruns those that crash, but for crashes of confirmed kinds (`crashes_in_forks`). The `warm` engine
 forks before the first step. So does this engine if a run stops at its first terminal hazard and the golden
 run has one, too.
 """
@@ -23,7 +23,7 @@ from mutator._common.files import (
 from mutator._common.message_text import counted
 from mutator.engines.authenticated_files import AuthenticatedFiles
 from mutator.engines.code_swap_planning import CodeSwap, plan_swap
-from mutator.engines.crashes_in_forks import CrashClasses, is_same_crash
+from mutator.engines.crashes_in_forks import CrashKinds, is_same_crash
 from mutator.engines.engine_jobs import (
     EngineArguments,
     Job,
@@ -91,7 +91,7 @@ class ForkEngine:
         self._forks_before_first_step = before_first_step
         secret = secret or token_bytes(16)
         self._observation_store = ObservationStore(self._work_folder, secret)
-        self._crash_classes = CrashClasses(AuthenticatedFiles(self._work_folder, secret))
+        self._crash_kinds = CrashKinds(AuthenticatedFiles(self._work_folder, secret))
         mode = RunMode.WARM if before_first_step else RunMode.FORK
         self._results = ForkResults(limits, self._work_folder, mode)
         self._patience_s = limits.wall_s + GUARD_PATIENCE_S
@@ -135,7 +135,7 @@ class ForkEngine:
             return self._run_on_reference_engine(
                 job, f"its folders were changed during the run ({err.strerror})"
             )
-        if result.crash_class and not self._crash_classes.is_confirmed(result.crash_class):
+        if result.crash_kind and not self._crash_kinds.is_confirmed(result.crash_kind):
             return self._confirm_crash(job, result)
         return result
 
@@ -143,7 +143,7 @@ class ForkEngine:
         assert of_fork.exception is not None
         reason = f"ended as crashed: {of_fork.exception.description_without_place}"
         result = self._run_on_reference_engine(job, reason)
-        self._crash_classes.note(of_fork.crash_class, is_same=is_same_crash(of_fork, result))
+        self._crash_kinds.note(of_fork.crash_kind, is_same=is_same_crash(of_fork, result))
         return result
 
     def _run_on_reference_engine(self, job: Job, fallback_reason: str) -> JobResult:

@@ -50,7 +50,7 @@ class PlannedPass:
 
 
 class WatchedCampaign:
-    """A campaign that is run pass after pass in `folder`, which the caller has locked by `owning_folder`."""
+    """A campaign that is run pass after pass in `folder`. The caller holds `lock_watch_folder`."""
 
     def __init__(
         self,
@@ -196,7 +196,7 @@ class WatchedCampaign:
 
 
 @contextmanager
-def owning_folder(folder: Path) -> Iterator[None]:
+def lock_watch_folder(folder: Path) -> Iterator[None]:
     """Create the folder of the passes, and lock it; MutatorError if it is a run folder, or in use."""
     if RunFolder.exists(folder):
         raise MutatorError(

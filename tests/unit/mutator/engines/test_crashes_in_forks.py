@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mutator.engines.authenticated_files import AuthenticatedFiles
-from mutator.engines.crashes_in_forks import NEEDED_CONFIRMATIONS, CrashClasses, judge_crash
+from mutator.engines.crashes_in_forks import NEEDED_CONFIRMATIONS, CrashKinds, judge_crash
 from mutator.engines.engine_jobs import Job
 from mutator.engines.in_target.fork_output import ForkOutput
 from mutator.engines.process_endings import ProcessEnding
@@ -25,24 +25,24 @@ def g():
 """
 
 
-def classes(folder: Path, secret: bytes = b"s") -> CrashClasses:
-    return CrashClasses(AuthenticatedFiles(folder, secret))
+def kinds(folder: Path, secret: bytes = b"s") -> CrashKinds:
+    return CrashKinds(AuthenticatedFiles(folder, secret))
 
 
-def test_a_class_needs_three_confirmations_by_any_worker(tmp_path: Path) -> None:
+def test_a_kind_needs_three_confirmations_by_any_worker(tmp_path: Path) -> None:
     for _ in range(NEEDED_CONFIRMATIONS):
-        assert not classes(tmp_path).is_confirmed("a")
-        classes(tmp_path).note("a", is_same=True)
-    assert classes(tmp_path).is_confirmed("a")
-    assert not classes(tmp_path).is_confirmed("b")
-    assert not classes(tmp_path, b"of somebody else").is_confirmed("a")
+        assert not kinds(tmp_path).is_confirmed("a")
+        kinds(tmp_path).note("a", is_same=True)
+    assert kinds(tmp_path).is_confirmed("a")
+    assert not kinds(tmp_path).is_confirmed("b")
+    assert not kinds(tmp_path, b"of somebody else").is_confirmed("a")
 
 
-def test_one_other_result_of_the_reference_engine_excludes_a_class(tmp_path: Path) -> None:
-    classes(tmp_path).note("a", is_same=False)
+def test_one_other_result_of_the_reference_engine_excludes_a_kind(tmp_path: Path) -> None:
+    kinds(tmp_path).note("a", is_same=False)
     for _ in range(NEEDED_CONFIRMATIONS + 1):
-        classes(tmp_path).note("a", is_same=True)
-    assert not classes(tmp_path).is_confirmed("a")
+        kinds(tmp_path).note("a", is_same=True)
+    assert not kinds(tmp_path).is_confirmed("a")
 
 
 def judge(work: Path, ended: ProcessEnding = ENDED, active: bool = True, **changes: Any) -> Any:
@@ -96,7 +96,7 @@ def test_crashes_of_a_kind_have_the_same_message_and_place(tmp_path: Path) -> No
     frames = [["a.py", 5, 4, False], ["a.py", 5, 11, True]]
     crash = {"classes": ["builtins.ZeroDivisionError"], "frames": [frames]}
     judged = judge(tmp_path), judge(tmp_path), judge(tmp_path, error=error), judge(tmp_path, crash=crash)
-    same, again, *others = (each.class_id for each in judged)
+    same, again, *others = (each.kind_id for each in judged)
     assert same == again and same not in others
 
 
