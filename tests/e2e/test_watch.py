@@ -136,6 +136,19 @@ def test_a_mistake_that_is_undone_leaves_the_exit_code_of_the_last_pass(desk: De
     assert desk.end() == EXIT_OK
 
 
+def test_an_edit_that_fails_a_check_leaves_no_run_that_looks_current(desk: Desk) -> None:
+    """Once it is undone, the verdicts of before are run again, mostly from the store."""
+    desk.read_until(_END_OF_PASS)
+    verdicts = desk.verdicts()
+    desk.edit("fault_library/campaigns/desk.yaml", "at_s: 1.0", "at_s: 5.9")
+    lines = desk.read_until("waiting for the next edit")
+    assert any("canary" in line for line in lines), lines
+    desk.edit("fault_library/campaigns/desk.yaml", "at_s: 5.9", "at_s: 1.0")
+    desk.read_until(_END_OF_PASS)
+    assert desk.verdicts() == verdicts
+    assert desk.end() == EXIT_OK
+
+
 def test_an_edit_during_a_pass_begins_it_again(desk: Desk) -> None:
     """Its verdicts are those of the new files."""
     desk.read_until("watching desk")
