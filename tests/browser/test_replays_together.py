@@ -16,7 +16,10 @@ PICKER = "#experiment select[aria-label='Compare with']"
 # whether a plot has pixels of the colour of the other experiment's line
 HAS_LINE = """() => {
     const canvas = document.querySelector('#experiment .plot-of canvas'), { width, height } = canvas;
-    const { data } = canvas.getContext('2d').getImageData(0, 0, width, height);
+    // a copy, because Chromium remarks on repeated readings of a canvas that it draws by the GPU
+    const context = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
+    context.drawImage(canvas, 0, 0);
+    const { data } = context.getImageData(0, 0, width, height);
     const isLine = (i) => data[i] === 0x6a && data[i + 1] === 0x3f && data[i + 2] === 0xb5;
     return Array.from({ length: width * height }, (_, i) => 4 * i).some(isLine);
 }"""
