@@ -156,6 +156,14 @@ def _unmatched_reasons_table(comparison: Comparison) -> TextTable:
     return TextTable(heads=("why", "experiments"), rows=rows, right_aligned=(1,))
 
 
+_HEAD_BY_WORD = {"worse": "Worse", "better": "Better", "otherwise": "Changed"}
+_CHANGE_BY_WORD = {
+    "worse": "got worse",
+    "better": "got better",
+    "otherwise": "changed without getting worse or better",
+}
+
+
 def verdict_word_and_sentence(comparison: Comparison) -> tuple[str, str]:
     """Return a word for the change from the first run to the second (worse, better, otherwise, same), and a
     sentence with the numbers of experiments. An experiment that is worse in any respect is not better.
@@ -169,11 +177,11 @@ def verdict_word_and_sentence(comparison: Comparison) -> tuple[str, str]:
     experiments = counted(len(comparison.pairs), "experiment")
     if not all_kinds:
         return "same", f"No change: {experiments} in both runs, with equal results."
-    counts = {"for the worse": worse, "only for the better": better, "otherwise": otherwise}
-    changed = ", ".join(f"{count} {how}" for how, count in counts.items() if count)
-    word = "worse" if worse else "better" if better else "otherwise"
-    head = {"worse": "Worse", "better": "Better", "otherwise": "Changed"}[word]
-    return word, f"{head}: of {experiments} in both runs, {changed}."
+    counts = {"worse": worse, "better": better, "otherwise": otherwise}
+    parts = [f"{count} {_CHANGE_BY_WORD[word]}" for word, count in counts.items() if count]
+    word = next(word for word, count in counts.items() if count)
+    parts[0] = f"{counts[word]} of {experiments} in both runs {_CHANGE_BY_WORD[word]}"
+    return word, f"{_HEAD_BY_WORD[word]}: {', '.join(parts)}."
 
 
 def render_html_page(comparison: Comparison, addresses: ReportAddresses) -> str:

@@ -80,7 +80,7 @@ def test_the_page_leads_from_the_verdict_to_both_replays(
     changed = len(found.changed_pairs)
     assert (
         page.inner_text(".verdict").replace("\u00a0", " ")
-        == f"Worse: of 24 experiments in both runs, {changed} for the worse."
+        == f"Worse: {changed} of 24 experiments in both runs got worse."
     )
     tops = [
         page.locator(selector).first.bounding_box()["y"]
