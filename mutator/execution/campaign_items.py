@@ -25,6 +25,7 @@ class ItemSource(ABC):
     def __init__(self) -> None:
         self._runner: ItemRunner | None = None
         self._has_failed = False
+        self.collected_path: Path | None = None  # by which pytest came to the file
 
     @property
     @abstractmethod
@@ -128,8 +129,15 @@ def collect_alone(session: pytest.Session, file: pytest.File) -> bool:
 
 
 def source_of(path: Path, sources: Mapping[str, ItemSource]) -> ItemSource | None:
-    """Return the campaign in a file; `sources` are by real path."""
-    return sources.get(os.path.realpath(path))
+    """Return the campaign in a file that pytest comes to; `sources` are by real path. None if there is none,
+    or if pytest has come to the same file by another name, such as that of a symbolic link.
+    """
+    source = sources.get(os.path.realpath(path))
+    if source is None:
+        return None
+    if source.collected_path is None:
+        source.collected_path = path
+    return source if source.collected_path == path else None
 
 
 @lru_cache

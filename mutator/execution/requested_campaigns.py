@@ -56,18 +56,26 @@ def find_requested_campaigns(config: pytest.Config) -> RequestedCampaigns:
     files = [path for path in arguments if path.suffix in _YAML_SUFFIXES and _schema_of(path)]
     is_in_root = config.invocation_params.dir == config.rootpath
     is_plain = is_in_root and config.args_source is not pytest.Config.ArgsSource.ARGS
-    for path in (*settings.get("campaigns", ()), *settings.get("regressions", ())):
+    for path in _distinct_files([*settings.get("campaigns", ()), *settings.get("regressions", ())]):
         if any(path == place or place in path.parents for place in arguments):
             files.append(path)
         elif is_plain:
             files.append(path)
             config.args.append(str(path))
-    return RequestedCampaigns(files=tuple(dict.fromkeys(files)), library=library, target=target)
+    return RequestedCampaigns(files=tuple(_distinct_files(files)), library=library, target=target)
 
 
 def is_regression_file(path: Path) -> bool:
     """Whether a file has saved experiments, and is no campaign."""
     return _schema_of(path) == b"regression"
+
+
+def _distinct_files(paths: list[Path]) -> list[Path]:
+    """Return each file once, although several patterns or symbolic links name it."""
+    path_by_real_path: dict[Path, Path] = {}
+    for path in sorted(paths, key=Path.is_symlink):  # a link only if the file itself is not listed
+        path_by_real_path.setdefault(path.resolve(), path)
+    return list(path_by_real_path.values())
 
 
 def _schema_of(path: Path) -> bytes | None:

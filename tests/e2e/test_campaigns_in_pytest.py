@@ -72,6 +72,21 @@ def node_ids(printed: str) -> list[str]:
     return NAME.findall(printed)
 
 
+@pytest.mark.parametrize("place", [(), (".",), ("fault_library",)], ids=["plain", "root", "folder"])
+def test_a_symbolic_link_to_a_campaign_is_no_second_one(
+    project: Path, in_pytest: Pytest, place: tuple[str, ...]
+) -> None:
+    """Wherever pytest looks, it collects each experiment once."""
+    link = project / "fault_library" / "campaigns" / "z.yaml"
+    link.symlink_to("small.yaml")
+    try:
+        code, printed = in_pytest("--collect-only", "-q", *place)
+    finally:
+        link.unlink()
+    assert code == 0, printed
+    assert (len(node_ids(printed)), printed.count("::sensor/")) == (12, 12)
+
+
 def test_collecting_runs_nothing(project: Path, in_pytest: Pytest, no_process: None) -> None:
     """Plain `pytest` lists the project's campaign and its tests. Each experiment has a name of its own."""
     code, printed = in_pytest("--collect-only", "-q")

@@ -69,6 +69,17 @@ def test_the_campaigns_of_a_project_are_collected_where_pytest_looks(root: Path)
     assert (requested.files, places) == ((), [str(root / "tests")])
 
 
+def test_a_file_that_several_names_lead_to_is_one_campaign(root: Path) -> None:
+    """Patterns that overlap and symbolic links name it; its own name counts."""
+    campaigns = root / "faults" / "campaigns"
+    (campaigns / "0.yaml").symlink_to("a.yaml")
+    settings(root, "faults/campaigns/[0a].yaml", "faults/*/a.yaml")
+    requested, places = ask(root, "tests", source=SOURCES.TESTPATHS)
+    assert requested.files == (campaigns / "a.yaml",)
+    assert places == ["tests", str(campaigns / "a.yaml")]
+    assert ask(root, "faults/campaigns/0.yaml")[0].files == (campaigns / "0.yaml",)
+
+
 @pytest.mark.parametrize(
     "head", ['schema: "campaign/1"', "'schema' : 'campaign/1'", "\ufeffschema: campaign/1"]
 )
