@@ -13,6 +13,7 @@ from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 
 _MOST_LISTED_REASONS = 3
+NOT_RECORDED_REASON = "what they executed was not recorded"
 CAN_RECORD_CODE = sys.version_info >= (3, 12)  # with `sys.monitoring`
 NO_RECORDING_TEXT = (
     f"Python {sys.version_info[0]}.{sys.version_info[1]} cannot tell what a run executes, as Python 3.12 can"
@@ -52,13 +53,8 @@ class EarlierRunUse:
         """
         if not self.since:
             return 0, ""
-        left_out, reasons = 0, Counter[str]()
-        for line in folder.timings().values():
-            if line["worker"].startswith(worker_prefix):
-                left_out += line["engine"] == RunMode.UNAFFECTED.value
-                if reason := line.get("affected"):
-                    reasons[reason] += 1
-        return left_out, describe_left_out(self.since.path, left_out, reasons)
+        left_out, reasons = _left_out_and_reasons(folder, worker_prefix)
+        return left_out, f"since {self.since.path.name}: {describe_left_out(left_out, reasons)}"
 
 
 def open_earlier_run(earlier_run: Path, out: Path) -> RunFolder:
@@ -74,11 +70,28 @@ def open_earlier_run(earlier_run: Path, out: Path) -> RunFolder:
     return RunFolder.open(earlier_run)
 
 
-def describe_left_out(earlier_run: Path, left_out: int, reasons: Mapping[str, int]) -> str:
-    """Return a sentence on what `--since` left out, and why the others ran."""
+def left_out_of_whole_run(folder: RunFolder) -> str:
+    """Return what `--since` left out in all sessions of a run; empty if none had an earlier run."""
+    left_out, reasons = _left_out_and_reasons(folder, "")
+    return describe_left_out(left_out, reasons) if left_out or reasons else ""
+
+
+def _left_out_and_reasons(folder: RunFolder, worker_prefix: str) -> tuple[int, Counter[str]]:
+    """Return how many experiments were left out, and how many ran for each reason."""
+    left_out, reasons = 0, Counter[str]()
+    for line in folder.timings().values():
+        if line["worker"].startswith(worker_prefix):
+            left_out += line["engine"] == RunMode.UNAFFECTED.value
+            if reason := line.get("affected"):
+                reasons[reason] += 1
+    return left_out, reasons
+
+
+def describe_left_out(left_out: int, reasons: Mapping[str, int]) -> str:
+    """Return how many experiments `--since` left out, and why the others ran."""
     count = left_out + sum(reasons.values())
-    text = f"since {earlier_run.name}: {left_out:,} of {count:,} left out"
-    if not CAN_RECORD_CODE:
+    text = f"{left_out:,} of {count:,} left out"
+    if not CAN_RECORD_CODE and reasons.keys() <= {NOT_RECORDED_REASON} and not left_out:
         return f"{text}: {NO_RECORDING_TEXT}"
     text += ", because nothing that they executed has changed" if left_out else ""
     listed = sorted(reasons.items(), key=lambda item: (-item[1], item[0]))

@@ -14,6 +14,7 @@ from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import RunMode
 from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.execution.code_recording import CodeRecording
+from mutator.execution.earlier_run import NOT_RECORDED_REASON
 from mutator.execution.experiment_runner import CopiedRun
 from mutator.execution.run_reuse import is_storable
 from mutator.model import Experiment, Record
@@ -28,7 +29,6 @@ from mutator.targets.function_digests import MODULE_PART, parts_of_file
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches_any_glob
 
-NOT_RECORDED_REASON = "what they executed was not recorded"
 _EXPERIMENTS_PER_RUN_OF_PROOF = 20  # of those that are left out and in the sample of the proof
 
 

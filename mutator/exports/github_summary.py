@@ -11,7 +11,9 @@ from mutator.campaigns.fault_positions import SourcePosition
 from mutator.comparison.comparison_files import differing_files_text, verdict_word_and_sentence
 from mutator.comparison.run_comparison_and_gates import Comparison, Gate
 from mutator.errors import MutatorError
+from mutator.execution.earlier_run import left_out_of_whole_run
 from mutator.exports.highlights import ChartMaker, Highlight
+from mutator.store.run_folder import RunFolder
 
 _MOST_WORST = 3  # experiments with a sentence and a chart
 _MOST_LISTED = 20  # further experiments in the table
@@ -56,6 +58,7 @@ def comparison_summary(
         verdict_word_and_sentence(comparison)[1],
         differing_files_text(comparison),
         *map(escaped_markdown_line, comparison.remarks),
+        *_left_out_by_since(comparison.b.folder),
         *_reason_without_places(charts),
         *_worst_experiments(highlights, charts, repository),
         f"### {changes.title}",
@@ -76,6 +79,7 @@ def run_summary(
     parts = [
         f"## {escaped_markdown_line(name)}",
         f"**{escaped_markdown_line(verdict)}**",
+        *_left_out_by_since(charts.folder),
         *_reason_without_places(charts),
         *_worst_experiments(highlights, charts, repository),
         "### Results",
@@ -107,6 +111,11 @@ def _gate_verdict(comparison: Comparison, gates: Sequence[Gate], highlights: Seq
     if missing := comparison.missing_result_count:
         return f"**The gate cannot decide: {counted(missing, 'result')} missing.** It looks for {names}."
     return f"**The gate passes: no experiment fails {names}.**"
+
+
+def _left_out_by_since(folder: RunFolder) -> list[str]:
+    text = left_out_of_whole_run(folder)
+    return [f"`--since`: {escaped_markdown_line(text)}."] if text else []
 
 
 def _reason_without_places(charts: ChartMaker) -> list[str]:

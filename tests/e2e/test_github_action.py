@@ -101,6 +101,7 @@ def test_a_change_with_new_hazards_fails_with_annotations_summary_and_sarif(
     summary = (runner.temp / "summary.md").read_text()
     assert summary.startswith("## base against new\n\n**The gate fails for ")
     assert "Files of the target changed: toycar/driver.py." in summary
+    assert re.search(r"`--since`: \d+ of \d+ left out", summary)
     assert "```mermaid" in summary
     runs = runner.temp / "mutator-runs" / "toy"
     assert runner.context["steps.files.outputs.sarif"] == str(runs / "hazards.sarif")

@@ -14,7 +14,9 @@ from mutator.exports.github_summary import Repository, comparison_summary
 from mutator.exports.highlights import ChartMaker, HighlightedSource, highlights_of_failures
 from mutator.model import Experiment, Outcome
 from mutator.outcomes.series_sampling import write_sampled_series
+from mutator.store.checksummed_lines import LineWriter
 from mutator.store.run_folder import RunFolder
+from mutator.store.timings import TIMINGS_FOLDER, TIMINGS_SCHEMA
 from mutator.workspace import Workspace
 
 NO_LINKS = Repository()
@@ -67,7 +69,7 @@ def test_the_verdict_comes_first_and_then_three_with_sentence_place_and_chart(
         f"**The gate fails for {hazards} experiments: "
         f"`new-hazard` {hazards}, `new-silent-hazard` {hazards}.**"
     )
-    assert lines[4].startswith(f"Worse: of 24 experiments in both runs, {hazards} for the worse")
+    assert lines[4] == f"Worse: {hazards} of 24 experiments in both runs got worse."
     text = "\n".join(lines)
     worst, others = text.split("### The worst")[1].split("### And")
     assert worst.count("#### sensor/") == worst.count("```mermaid") == worst.count("Hazard H3 occurs") == 3
@@ -76,6 +78,25 @@ def test_the_verdict_comes_first_and_then_three_with_sentence_place_and_chart(
     table, _, numbers = others.partition("### What changed")
     assert table.count("| `tree/toycar/sensing.py:") == hazards - 3
     assert "| sensor/lane |" in numbers
+
+
+def test_the_summary_says_what_a_change_could_not_affect(
+    toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
+    """It counts what `--since` left out, and says why the others ran."""
+    runs = write_run(toycar, tmp_path / "before"), write_run(toycar, tmp_path / "after")
+    names = list(RunFolder.open(runs[1]).records())
+    timings = LineWriter(runs[1] / TIMINGS_FOLDER / "0001-a.jsonl", {"schema": TIMINGS_SCHEMA})
+    times = {"cpu_s": 0.0, "wall_s": 0.0, "ended": "2026-01-01T00:00:00Z", "why": ""}
+    for name in names:
+        line = {"experiment_id": name, "worker": "0001-a", "host": "here", "engine": "unaffected"}
+        ran = {"engine": "fork", "affected": "a_b.py is new"} if name == names[0] else {}
+        timings.append({**line, **times, **ran})
+    timings.close()
+    count = f"{len(names) - 1} of {len(names)} left out, because nothing that they executed has changed"
+    text = f"`--since`: {count}; the others ran: a_b.py is new (1)."
+    assert text in summary(compare_runs(*runs), toycar).splitlines()
+    assert "--since" not in summary(compare_runs(*reversed(runs)), toycar)
 
 
 def test_a_gate_that_passes_says_for_what_it_looked(compared: Comparison, workspace: Workspace) -> None:
