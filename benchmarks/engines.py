@@ -29,8 +29,8 @@ from mutator.execution.loaded_goldens import LoadedGoldens  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.outcomes import trace_and_record_loading  # noqa: E402
+from mutator.store.golden_runs import GoldenRun  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
-from mutator.store.run_folder import GoldenRun  # noqa: E402
 from mutator.triggers.trigger_kinds import always_trigger  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 

@@ -39,9 +39,10 @@ from mutator.store.checks_file import CHECKS_FILE as CHECKS
 from mutator.store.checks_file import CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.file_digests import FileDigest
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.packed_patches import _PatchPacker
 from mutator.store.records import PROOF_FOLDER, RECORDS_SCHEMA, record_as_json
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_folder import RunFolder
 from mutator.store.series_format import encode_series
 from mutator.store.series_script import script_name_of, write_script
 from mutator.store.session_environments import SessionEnvironment

@@ -29,7 +29,8 @@ from step import RUN as LOOP_OF_STEP  # noqa: E402
 
 from mutator.campaigns.plan import build_plan  # noqa: E402
 from mutator.preflight.bench_checks import BenchChecks  # noqa: E402
-from mutator.store.run_folder import GoldenRun, RunFolder  # noqa: E402
+from mutator.store.golden_runs import GoldenRun  # noqa: E402
+from mutator.store.run_folder import RunFolder  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 MOST_OVERHEAD_S = 2.0

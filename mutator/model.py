@@ -3,12 +3,13 @@
 Declare new fields with `hashing.added_field`, so that existing ids do not change.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
-from mutator._common.hashing import added_field, as_json_types, content_id, non_default_added_fields
+from mutator._common.hashing import added_field, as_json_types, content_id, digest, non_default_added_fields
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 
 Value = int | float | str | bool | None
@@ -194,6 +195,26 @@ class Fault:
         return float(abs(self.value)) if isinstance(self.value, int | float) else 0.0
 
 
+@dataclass(frozen=True, kw_only=True)
+class ConcreteScenario:
+    """A family of scenarios with a value for each parameter."""
+
+    family: str  #: name of the family
+    values: Mapping[str, int | float | str]  #: the values by the parameters' keys, such as `ego_kph`
+    label: str  #: the values as text: `ego 60 km/h, gap 20 m`
+    text: str  #: the scenario in the target's format
+
+    @cached_property
+    def digest(self) -> str:
+        """The digest of the text."""
+        return digest(self.text.encode())
+
+    @property
+    def name(self) -> str:
+        """The name: the family, and the first 12 digits of the digest."""
+        return f"{self.family}-{self.digest[:12]}"
+
+
 @dataclass(frozen=True)
 class Experiment:
     """One run: a fault, a scenario, a trigger and a seed."""
@@ -207,6 +228,8 @@ class Experiment:
     setting: tuple[str, ...] = ()  #: changes of the scenario that the campaign makes for all its experiments
     #: whether the run continues after a terminal hazard: `go_on` or `stop`
     after_hazard: AfterHazard = added_field(AfterHazard.GO_ON)
+    #: the scenario, if a family gave it, until a plan has it; name and digest identify it
+    concrete: ConcreteScenario | None = field(default=None, compare=False, repr=False)
 
     @cached_property
     def id(self) -> str:

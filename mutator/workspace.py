@@ -21,6 +21,8 @@ from mutator._common.message_text import counted, describe_choices, spelling_sug
 from mutator._common.shipped_files import shipped_folder
 from mutator._common.table_rendering import TextTable
 from mutator.errors import MutatorError
+from mutator.families.family import Family
+from mutator.families.family_yaml import load_family
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec, load_spec
@@ -28,6 +30,7 @@ from mutator.faults.library_readings import SpecReadings, load_readings
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
 from mutator.results.table_columns import check_column_names
+from mutator.store.planned_scenarios import PlannedScenarios
 from mutator.stpa.accidents_and_hazards import HazardList, load_hazard_list
 from mutator.stpa.context_tables import ContextTable, load_context_table
 from mutator.stpa.hazard_analysis_yaml import (
@@ -53,6 +56,8 @@ class Workspace:
     templates: Path  #: the folder templates/
     target: Path | None = None  #: root of the target's source; None: as in the manifest
     sandbox: bool = False  #: whether a target's code runs in a sandbox
+    #: the concrete scenarios of a run's plan, which `scenario` then finds by name, too
+    planned_scenarios: PlannedScenarios | None = None
 
     def __repr__(self) -> str:
         counts = ", ".join(counted(len(names), what) for what, names in self._names_by_kind())
@@ -70,6 +75,7 @@ class Workspace:
         return (
             ("fault spec", specs),
             ("scenario", self.scenarios),
+            *([("family", self.families)] if self.families else []),
             ("context table", self.context_tables),
             ("campaign", self.campaigns),
             ("target", self.targets),
@@ -233,7 +239,22 @@ class Workspace:
 
     def scenario(self, name: str | Path) -> Path:
         """Return the file of the scenario with this name or path."""
+        if self.planned_scenarios and str(name) in self.planned_scenarios.by_name:
+            return self.planned_scenarios.file(str(name))
         return self._find_file("scenarios", name, "scenario")
+
+    def with_scenarios_of(self, run: Path) -> "Workspace":
+        """Return the workspace with the concrete scenarios of a run folder."""
+        return replace(self, planned_scenarios=PlannedScenarios.of(run))
+
+    @property
+    def families(self) -> Mapping[str, Path]:
+        """The families of scenarios of the library by name; `family` reads one."""
+        return self._path_by_name("families")
+
+    def family(self, name: str | Path) -> Family:
+        """Return the family of scenarios with this name or path."""
+        return load_family(self._find_file("families", name, "family of scenarios"))
 
     @property
     def campaigns(self) -> Mapping[str, Path]:

@@ -39,7 +39,8 @@ from mutator.statistics.mutation_score import mutation_score_sheet, totals_table
 from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import run_deletion
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.golden_runs import GoldenRun
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
 from mutator.targets.overhead_view_json import scene_as_json
 

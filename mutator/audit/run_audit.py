@@ -90,7 +90,7 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
         ),
         AuditCheck.from_problems(
             "golden runs that match the checks",
-            len(head.goldens),
+            len(folder.golden_runs),
             chain(checks_of(folder), _golden_problems(folder), idle),
         ),
         source_check,
@@ -207,7 +207,7 @@ def _source_problems(folder: RunFolder, workspace: Workspace | None) -> Problems
         )
         return
     manifest = workspace.manifest(head.target)
-    current_digests = RunInputs.from_workspace(workspace, manifest, folder.scenarios).digest_by_source()
+    current_digests = RunInputs.of_run(workspace, folder).digest_by_source()
     for name, recorded in head.sources.items():
         if current_digests.get(name) != recorded:
             yield MutatorError(

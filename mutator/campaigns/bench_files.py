@@ -84,7 +84,7 @@ def load_bench_file(path: Path) -> Campaign:
         path=path,
         file_bytes=read_bounded(path),
         target=model.target,
-        scenarios=(),
+        scenario_selections=(),
         changes_by_reading={EVERY_READING: ()},
         fault_selections=(),
         reading=model.reading,

@@ -5,11 +5,13 @@ from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
 from fnmatch import fnmatchcase
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import is_inside, path_below
+from mutator._common.confined_files import checked_name_not_path, is_inside, path_below
+from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator._common.message_text import describe_choices
 from mutator.campaigns.campaign_files import Campaign
@@ -19,9 +21,10 @@ from mutator.campaigns.operator_selection import MutantActivity
 from mutator.campaigns.sampling import evenly_spread_indices
 from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError
+from mutator.families.scenario_sampling import sample_scenarios
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand_spec
-from mutator.model import Experiment, Fault, Method, Trigger
+from mutator.model import ConcreteScenario, Experiment, Fault, Method, Trigger
 from mutator.operators.executed_lines_and_types import GoldenRunInputs
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger, draw_trigger_time, trigger_at_time
@@ -39,11 +42,12 @@ class CampaignExpansion:
         self.workspace = workspace
         self.campaign = campaign
         self.manifest = manifest
-        self.seed = seed
+        self.seed = self._first_seed = seed
         self.reading = reading
         armed_after_s = campaign.armed_after_s_in(reading)
         self.armed_after_s = manifest.armed_after_s if armed_after_s is None else armed_after_s
-        self._scenario_digests: dict[str, str] = {}
+        self._digest_and_concrete_by_scenario: dict[str, tuple[str, ConcreteScenario | None]] = {}
+        self._temporary_scenarios: list[ScratchFolder] = []  # concrete scenarios, if operators drive them
         self._library_specs: list[tuple[FaultSpec, ...]] = []
         self._fault_models = workspace.fault_models()
         self._operator_faults = OperatorFaultFinder(manifest, self._fault_models, campaign.golden_run_limits)
@@ -66,7 +70,7 @@ class CampaignExpansion:
         triggers = self._campaign_triggers()
         ordered = [
             (order, experiment)
-            for order, scenario in enumerate(self.campaign.scenarios)
+            for order, scenario in enumerate(self._scenarios)
             for experiment in (
                 *self._experiments_of_faults(scenario, faults, triggers),
                 *self._experiments_of_operator_faults(scenario, operator_faults, triggers),
@@ -201,12 +205,29 @@ class CampaignExpansion:
     def _golden_inputs_by_scenario(self) -> dict[str, GoldenRunInputs]:
         return {
             name: GoldenRunInputs(
-                scenario=self._scenario_file(name),
+                scenario=self._file_of_any_scenario(name),
                 changes=self.campaign.changes_in(self.reading),
                 seed=self.seed,
             )
-            for name in self.campaign.scenarios
+            for name in self._scenarios
         }
+
+    @cached_property
+    def _scenarios(self) -> tuple[str, ...]:
+        """The names of all scenarios. Those of families are drawn with the plan's first seed."""
+        names: list[str] = []
+        for i, selection in enumerate(self.campaign.scenario_selections):
+            if isinstance(selection, str):
+                names.append(selection)
+                continue
+            with self._errors_located_at(("scenarios", i, "family")):
+                family = self.workspace.family(checked_name_not_path(selection.family, self.campaign.path))
+                drawn = sample_scenarios(
+                    family, selection.count, selection.sampling or family.sampling, self._first_seed
+                )
+            self._digest_and_concrete_by_scenario |= {s.name: (s.digest, s) for s in drawn}
+            names += [scenario.name for scenario in drawn]
+        return tuple(names)
 
     def _unmatched_pattern_error(
         self, keys: KeyPath, pattern: str, library: Sequence[_NumberedFault] = ()
@@ -294,21 +315,35 @@ class CampaignExpansion:
         return trigger_at_time(time, name=f"random/{paired_trigger.name}", hold_s=self.campaign.hold_s)
 
     def _build_experiment(self, fault: Fault, scenario: str, method: Method, trigger: Trigger) -> Experiment:
+        scenario_digest, concrete = self._digest_and_concrete(scenario)
         return Experiment(
             fault=fault,
             scenario=scenario,
-            scenario_digest=self._scenario_digest(scenario),
+            scenario_digest=scenario_digest,
             method=method,
             trigger=trigger,
             seed=self.seed,
             setting=self.campaign.changes_in(self.reading),
             after_hazard=self.campaign.after_hazard,
+            concrete=concrete,
         )
 
-    def _scenario_digest(self, scenario: str) -> str:
-        if scenario not in self._scenario_digests:
-            self._scenario_digests[scenario] = digest(read_bounded(self._scenario_file(scenario)))
-        return self._scenario_digests[scenario]
+    def _digest_and_concrete(self, scenario: str) -> tuple[str, ConcreteScenario | None]:
+        if scenario not in self._digest_and_concrete_by_scenario:
+            scenario_digest = digest(read_bounded(self._scenario_file(scenario)))
+            self._digest_and_concrete_by_scenario[scenario] = scenario_digest, None
+        return self._digest_and_concrete_by_scenario[scenario]
+
+    def _file_of_any_scenario(self, name: str) -> Path:
+        """Return the file of a scenario; that of a family is in a temporary folder."""
+        _, concrete = self._digest_and_concrete(name)
+        if concrete is None:
+            return self._scenario_file(name)
+        if not self._temporary_scenarios:
+            self._temporary_scenarios.append(ScratchFolder("mutator-scenarios-"))
+        path = path_below(self._temporary_scenarios[0].path, f"{name}.yaml")
+        path.write_text(concrete.text)
+        return path
 
     def _scenario_file(self, scenario: str) -> Path:
         scenarios = self.workspace.scenarios
@@ -335,5 +370,5 @@ class CampaignExpansion:
 
     def _scenario_key_path(self, scenario: str) -> KeyPath:
         if scenario in self.campaign.scenarios:
-            return ("scenarios", self.campaign.scenarios.index(scenario))
+            return ("scenarios", self.campaign.scenario_selections.index(scenario))
         return ("canary", "scenario")

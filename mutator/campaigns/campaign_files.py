@@ -40,6 +40,15 @@ class FaultSelection:
     operator_selection: OperatorSelection | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FamilySelection:
+    """Concrete scenarios of a family: how many to draw (None: all of a grid), and how (None: its default)."""
+
+    family: str
+    count: int | None = None
+    sampling: str | None = None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Campaign:
     """A checked campaign file. Times are simulated seconds."""
@@ -50,7 +59,7 @@ class Campaign:
     path: Path
     file_bytes: bytes
     target: str
-    scenarios: tuple[str, ...]
+    scenario_selections: tuple[str | FamilySelection, ...]  # names of scenarios, and families
     changes_by_reading: Mapping[str, tuple[str, ...]]
     fault_selections: tuple[FaultSelection, ...]
     reading: str | None  # None: the library's default
@@ -78,6 +87,11 @@ class Campaign:
     def seed(self) -> int:
         """The seed, or the first of several."""
         return self.seeds[0]
+
+    @property
+    def scenarios(self) -> tuple[str, ...]:
+        """The scenarios of the library that the file names."""
+        return tuple(selection for selection in self.scenario_selections if isinstance(selection, str))
 
     @property
     def measured_limit_names(self) -> frozenset[str]:
@@ -132,7 +146,12 @@ def load_campaign(path: Path) -> Campaign:
         path=path,
         file_bytes=read_bounded(path),
         target=model.target,
-        scenarios=tuple(model.scenarios),
+        scenario_selections=tuple(
+            item
+            if isinstance(item, str)
+            else FamilySelection(family=item.family, count=item.sample, sampling=item.sampling)
+            for item in model.scenarios
+        ),
         changes_by_reading={reading: tuple(names) for reading, names in model.setting.items()},
         fault_selections=tuple(
             FaultSelection(
@@ -186,7 +205,8 @@ def _check_no_duplicates(model: CampaignModel, source: YamlSource) -> None:
         ("setting",) if name == EVERY_READING else ("setting", name): names
         for name, names in model.setting.items()
     }
-    lists: dict[KeyPath, Sequence[str]] = {("scenarios",): model.scenarios, ("methods",): model.methods}
+    scenarios = [item if isinstance(item, str) else f"family {item.family}" for item in model.scenarios]
+    lists: dict[KeyPath, Sequence[str]] = {("scenarios",): scenarios, ("methods",): model.methods}
     for keys, values in (lists | settings).items():
         earlier = set[str]()
         for i, value in enumerate(values):

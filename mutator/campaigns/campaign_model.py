@@ -7,6 +7,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, mod
 from pydantic_core import PydanticKnownError
 
 from mutator._common.extension_doors import OPERATOR_DOOR
+from mutator._common.message_text import describe_choices
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
@@ -17,6 +18,7 @@ from mutator.campaigns.campaign_triggers import (
 from mutator.campaigns.expectations import Expectation
 from mutator.campaigns.operator_selection import MutantActivity
 from mutator.config.yaml_files import StrictModel, YamlRecord
+from mutator.families.scenario_sampling import SAMPLING_METHODS
 from mutator.model import AfterHazard, Limits, Method
 
 
@@ -106,6 +108,26 @@ class Canary:
     )
 
 
+class FamilyScenariosModel(StrictModel, title="Scenarios of a family"):
+    """Concrete scenarios, drawn from a [family](family.md) of the library."""
+
+    family: str = Field(description="The name of the family.")
+    sample: int | None = Field(
+        None, ge=1, le=1_000_000, description="How many to draw. Default, of a grid only: all."
+    )
+    sampling: str | None = Field(
+        None,
+        json_schema_extra={"enum": list(SAMPLING_METHODS)},
+        description="The method. Default: the family's.",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> "FamilyScenariosModel":
+        if self.sampling is not None and self.sampling not in SAMPLING_METHODS:
+            raise ValueError(f"`sampling` {describe_choices(SAMPLING_METHODS)}")
+        return self
+
+
 class SeedsModel(StrictModel, title="Seeds"):
     """The seeds with which the campaign is repeated."""
 
@@ -128,7 +150,11 @@ class CampaignModel(StrictModel, title="The file"):
         None, description="The [study](../how-to/add-a-study.md) with which its reports compare the results."
     )
     target: str = Field(description="The name of the target's manifest.")
-    scenarios: list[str] = Field(min_length=1, description="The scenarios by name, each once.")
+    scenarios: list[str | FamilyScenariosModel] = Field(
+        min_length=1,
+        description="The scenarios by name, each once, and scenarios of families: "
+        "`[S1, {family: r157_deceleration, sample: 100}]`.",
+    )
     setting: Annotated[
         dict[str, list[str]],
         BeforeValidator(to_value_by_reading),

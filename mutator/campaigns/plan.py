@@ -25,9 +25,10 @@ from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, MeasuredLimits
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import plan_file
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_choices import Choices
 from mutator.store.preflight_results import mean_golden_run_cpu_s
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_folder import RunFolder
 from mutator.store.shards import Shard
 from mutator.targets.stop_at_hazard_code import stop_function_source
 from mutator.workspace import Workspace

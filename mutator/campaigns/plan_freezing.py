@@ -31,6 +31,7 @@ from mutator.store import file_digests, plan_file
 from mutator.store.allowed_contents import SCRATCH_FOLDER
 from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
 from mutator.store.plain_contents_check import check_plain_contents
+from mutator.store.planned_scenarios import scenario_lines
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RUN_SCHEMA, Provenance, RunHead
 from mutator.store.session_progress import PROGRESS_FILE
@@ -117,7 +118,8 @@ def freeze_plan_in_owned_folder(
         return folder, tally
     used = UsedPhraseSources()
     tally, plan_digest, places, files = _write_plan_files(plan, out, used)
-    head = _build_head(plan, tally, plan_digest, workspace, places, used).file_bytes()
+    scenarios = files.get(plan_file.SCENARIOS_FILE)
+    head = _build_head(plan, tally, plan_digest, workspace, places, used, scenarios).file_bytes()
     file_digests.save_ledger(out, DigestLedger(files=files | {HEAD: FileDigest.of_bytes(head)}))
     write_atomic(out / HEAD, head)  # last, because this file makes the folder a run folder
     return RunFolder.open(out), tally
@@ -165,14 +167,16 @@ def _write_plan_files(
         plan_file.EXPERIMENTS_FILE: lines.digest,
         plan_file.FAULTS_FILE: faults.digest,
     }
+    if scenarios := tally.planned_scenarios():
+        content = scenario_lines(scenarios)
+        write_atomic(out / plan_file.SCENARIOS_FILE, content)
+        files[plan_file.SCENARIOS_FILE] = FileDigest.of_bytes(content)
     return tally, plan_digest, writer.chunks, files
 
 
 def _source_digests(tally: PlanTally, plan: Plan | SeedBySeedPlan, workspace: Workspace) -> dict[str, str]:
-    scenarios = {golden.scenario for golden in tally.golden_runs()}
-    return RunInputs.from_workspace(
-        workspace, workspace.manifest(plan.campaign.target), scenarios
-    ).digest_by_source()
+    manifest = workspace.manifest(plan.campaign.target)
+    return RunInputs.of_plan(workspace, manifest, tally).digest_by_source()
 
 
 def _build_head(
@@ -182,6 +186,7 @@ def _build_head(
     workspace: Workspace,
     chunks: list[plan_file.Chunk],
     used: UsedPhraseSources,
+    scenarios: FileDigest | None,
 ) -> RunHead:
     manifest = workspace.manifest(plan.campaign.target)
     canary: dict[str, Any] | None = None
@@ -204,7 +209,8 @@ def _build_head(
         limits=plan.campaign.limits,
         **vars(collect_target_facts(workspace, manifest)),
         phrases=phrases_of_campaign(workspace, plan.campaign, manifest, plan.reading, used),
-        goldens=tuple(golden.to_stored() for golden in tally.golden_runs()),
+        goldens=tuple(golden.to_stored() for golden in tally.listed_goldens),
+        scenarios=scenarios.sha256 if scenarios else None,
         canary=canary,
         canary_hazard=plan.campaign.canary.hazard if plan.campaign.canary else None,
         sources=_source_digests(tally, plan, workspace),

@@ -30,9 +30,10 @@ from mutator.model import Experiment
 from mutator.store import file_digests, plan_file
 from mutator.store.appended_files import AppendedFile
 from mutator.store.file_digests import DigestLedger, FileDigest
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import BATCHES_FILE, EXPERIMENTS_FILE, FAULTS_FILE
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RUN_SCHEMA, BenchFacts, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import Phrases

@@ -7,8 +7,9 @@ from hashlib import sha256
 
 from mutator._common.hashing import as_json_types, canonical_json
 from mutator.campaigns.campaign_files import Campaign
-from mutator.model import Experiment, Fault
-from mutator.store.run_folder import GoldenRun
+from mutator.model import ConcreteScenario, Experiment, Fault
+from mutator.store.golden_runs import GoldenRun
+from mutator.store.planned_scenarios import PlannedScenario
 
 # The start of every plan digest. Publications cite digests, so this text must never change.
 _PLAN_DIGEST_PREFIX = "run/1"
@@ -39,6 +40,7 @@ class PlanTally:
     count_by_type_and_method: Counter[FaultTypeAndMethod] = field(default_factory=Counter)
     goldens_without_canary: dict[GoldenRun, None] = field(default_factory=dict)
     example_fault_by_variant: dict[str, Fault] = field(default_factory=dict)  # one fault per variant
+    concrete_by_name: dict[str, ConcreteScenario] = field(default_factory=dict)  # scenarios of families
 
     def add(self, part: PlanPart) -> None:
         self.experiment_count += len(part.experiments)
@@ -51,12 +53,30 @@ class PlanTally:
                 GoldenRun.for_experiment(experiment, several_seeds=self.has_several_seeds)
             )
             self.example_fault_by_variant[fault.spec] = fault
+            if experiment.concrete is not None:
+                self.concrete_by_name[experiment.scenario] = experiment.concrete
 
     def golden_runs(self) -> tuple[GoldenRun, ...]:
         if self.canary is None:
             return tuple(self.goldens_without_canary)
         canary_golden = GoldenRun.for_experiment(self.canary, several_seeds=self.has_several_seeds)
         return tuple(dict.fromkeys((*self.goldens_without_canary, canary_golden)))
+
+    @property
+    def listed_goldens(self) -> tuple[GoldenRun, ...]:
+        """The golden runs of the library's scenarios."""
+        return tuple(run for run in self.golden_runs() if run.scenario not in self.concrete_by_name)
+
+    def planned_scenarios(self) -> tuple[PlannedScenario, ...]:
+        """Return the scenarios of families, with their golden runs."""
+        goldens: dict[str, list[GoldenRun]] = {name: [] for name in self.concrete_by_name}
+        for golden in self.golden_runs():
+            if golden.scenario in goldens:
+                goldens[golden.scenario].append(golden)
+        return tuple(
+            PlannedScenario(scenario=scenario, goldens=tuple(goldens[name]))
+            for name, scenario in self.concrete_by_name.items()
+        )
 
 
 class PlanDigestBuilder:

@@ -33,9 +33,10 @@ from mutator.preflight.bench_checks import BenchChecks
 from mutator.preflight.equivalence_check import EquivalenceResult
 from mutator.store import file_digests
 from mutator.store.appended_files import undo_unfinished_growth
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.preflight_results import golden_digests
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.required_packages import check_requirements

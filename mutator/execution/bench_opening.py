@@ -139,7 +139,6 @@ def _check_existing(workspace: Workspace, out: Path, file_bytes: bytes) -> None:
             remedy="give the same arguments, or choose another folder",
         )
     accepted_version_differences(folder)
-    current = RunInputs.from_workspace(workspace, workspace.manifest(folder.head.target), folder.scenarios)
-    check_sources(out, folder.head.sources, current.digest_by_source())
+    check_sources(out, folder.head.sources, RunInputs.of_run(workspace, folder).digest_by_source())
     file_digests.add_segments_to_ledger(out)
     remove_anything_at(folder.scratch_folder)

@@ -2,7 +2,7 @@
 
 import warnings
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -148,9 +148,8 @@ class FileRun(ItemSource):
             if campaign_runs_folder() in session.folder.path.parents:
                 prune_campaign_runs()
 
-    def _key_of_sources(self, target: str, scenarios: Iterable[str]) -> list[object]:
+    def _key_of_sources(self, inputs: RunInputs) -> list[object]:
         """Return what decides results, beside plan and file."""
-        inputs = RunInputs.from_workspace(self._workspace, self._workspace.manifest(target), scenarios)
         versions = [run_environment.python_version(), run_environment.versions_of_fixed_packages()]
         return [inputs.digest_by_source(), harness_digest(), versions, self._workspace.sandbox]
 
@@ -223,6 +222,7 @@ class CampaignRun(FileRun):
 
     def _default_run_folder(self) -> Path:
         plan = self._plan
-        sources = self._key_of_sources(plan.campaign.target, {golden.scenario for golden in plan.goldens()})
+        manifest = self._workspace.manifest(plan.campaign.target)
+        sources = self._key_of_sources(RunInputs.of_plan(self._workspace, manifest, plan.tally))
         key = content_id([plan.digest, plan.campaign.file_bytes.decode(), *sources])
         return path_below(campaign_runs_folder(), f"{plan.campaign.name}-{key}")

@@ -68,8 +68,5 @@ def _open_existing_run(workspace: Workspace, campaign: str | Path, out: Path, ch
                 argument=name,
                 remedy=f"leave out `{name}`, or use another folder",
             )
-    now = RunInputs.from_workspace(
-        workspace, workspace.manifest(head.target), folder.scenarios
-    ).digest_by_source()
-    check_sources(out, head.sources, now)
+    check_sources(out, head.sources, RunInputs.of_run(workspace, folder).digest_by_source())
     return folder

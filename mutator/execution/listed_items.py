@@ -11,7 +11,8 @@ from typing import Protocol
 from mutator.campaigns.chunks import PendingChunk, golden_key_by_chunk
 from mutator.model import Experiment, Fault, Method
 from mutator.store import plan_file
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.golden_runs import GoldenRun
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
 
 MOST_SINGLE_ITEMS = 20_000  # pytest keeps each item in memory; of larger plans, chunks are items

@@ -14,7 +14,7 @@ from mutator.outcomes.hazard_and_metric_judgement import load_judged_run, load_m
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.preflight.check_run_problems import output_digest_of
-from mutator.store.run_folder import GoldenRun
+from mutator.store.golden_runs import GoldenRun
 from mutator.targets.manifest import TargetManifest
 
 _T = TypeVar("_T")

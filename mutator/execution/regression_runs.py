@@ -9,6 +9,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.hashing import content_id
 from mutator.campaigns.expectations import NO_HAZARD
 from mutator.campaigns.regression_files import RegressionFile, load_regressions
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.execution.bench_opening import opened_bench
 from mutator.execution.campaign_runs import FileRun
@@ -69,7 +70,9 @@ class RegressionRun(FileRun):
 
     def _default_run_folder(self) -> Path:
         file = self._file
-        sources = self._key_of_sources(file.target, {entry.experiment.scenario for entry in file.experiments})
+        scenarios = {entry.experiment.scenario for entry in file.experiments}
+        manifest = self._workspace.manifest(file.target)
+        sources = self._key_of_sources(RunInputs.from_workspace(self._workspace, manifest, scenarios))
         ids = [entry.experiment.id for entry in file.experiments]
         key = content_id([ids, self.path.name, *sources])
         return path_below(campaign_runs_folder(), f"regressions-{key}")

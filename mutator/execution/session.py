@@ -226,7 +226,7 @@ class Session:
 
     @property
     def inputs(self) -> RunInputs:
-        return RunInputs.from_workspace(self.workspace, self.manifest, self.folder.scenarios)
+        return RunInputs.of_run(self.workspace, self.folder)
 
     def worker_assignment(self, name: str, *, parent_pid: int | None = None) -> WorkerAssignment:
         """Return the role of this session's worker `name`; `parent_pid` is None for this process."""

@@ -65,7 +65,7 @@ def open_session(
         try:
             with writing_progress(folder.path, notify) as progress:
                 session = Session(
-                    workspace,
+                    workspace.with_scenarios_of(folder.path),
                     folder,
                     workers=workers,
                     engine=engine,

@@ -22,9 +22,10 @@ from mutator.execution.earlier_benches import EarlierBenches
 from mutator.execution.earlier_run import CAN_RECORD_CODE
 from mutator.execution.session_summary import Summary
 from mutator.model import Experiment, Outcome, Record
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_choices import Choices
 from mutator.store.run_deletion import delete_run
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
 from mutator.workspace import Workspace
 
@@ -73,8 +74,7 @@ class WatchedCampaign:
         """Plan the campaign as its files are now; MutatorError for a mistake in them."""
         plan = build_plan(self._workspace, self._campaign, self._choices)
         manifest = self._workspace.manifest(plan.campaign.target)
-        scenarios = {golden.scenario for golden in plan.goldens()}
-        sources = RunInputs.from_workspace(self._workspace, manifest, scenarios).digest_by_source()
+        sources = RunInputs.of_plan(self._workspace, manifest, plan.tally).digest_by_source()
         scale = self._workspace.scale_of(manifest)
         values = _bench_values(plan)
         ids = [experiment.id for experiment in plan.experiments]

@@ -76,6 +76,7 @@ class Worker:
             self.folder.scratch_folder.mkdir(exist_ok=True)
         self._manifest, self._assignment = inputs.manifest, assignment
         self._scenario_files = dict(inputs.scenario_files)
+        self._planned_scenarios = inputs.planned_scenarios
         self._digest_by_golden_folder: dict[Path, str] = {}
         self._reuse = (
             RunReuse(assignment.reuse, self.folder, assignment.worker_name, self._golden_digest_of)
@@ -103,7 +104,7 @@ class Worker:
             golden_folder_of=self.folder.golden_folder_of,
             digest_by_golden_folder=self._digest_by_golden_folder,
             has_seeded_goldens=self.folder.has_seeded_goldens,
-            scenario_file=self._scenario_files.__getitem__,
+            scenario_file=self._scenario_file,
             with_series=bool(self.folder.series_budget_mb),
             find_copied_run=self._find_copied_run,
             find_proof=self._unaffected.find_for_proof if self._unaffected else find_nothing,
@@ -163,6 +164,11 @@ class Worker:
         for part in (self._reuse, self._recording):
             if part:
                 part.packages.add_goldens(facts)
+
+    def _scenario_file(self, name: str) -> Path:
+        if name in self._scenario_files or self._planned_scenarios is None:
+            return self._scenario_files[name]
+        return self._planned_scenarios.file(name)
 
     def _find_copied_run(self, experiment: Experiment, mutant: Mutant) -> CopiedRun | None:
         finders = (self._unaffected, self._reuse)

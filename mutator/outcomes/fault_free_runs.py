@@ -8,7 +8,8 @@ import numpy as np
 from mutator._common.table_rendering import TextTable
 from mutator.outcomes.hazard_and_metric_judgement import judge_run
 from mutator.outcomes.trace_and_record_loading import load_target_record, load_trace
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.golden_runs import GoldenRun
+from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 
 EventTimes = tuple[tuple[str, float], ...]  # (name, simulated time in s)

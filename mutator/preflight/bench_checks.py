@@ -38,8 +38,8 @@ from mutator.store.checks_file import (
     unpackaged_modules_as_json,
 )
 from mutator.store.file_digests import FileDigest
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.preflight_results import CheckResult
-from mutator.store.run_folder import GoldenRun
 from mutator.store.run_progress import ProgressCallback
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace

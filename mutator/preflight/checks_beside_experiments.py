@@ -27,8 +27,9 @@ from mutator.preflight.preflight_checks import (
     raise_if_failed,
     run_checks,
 )
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.preflight_results import CheckResult
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import StagePace
 from mutator.workspace import Workspace
 

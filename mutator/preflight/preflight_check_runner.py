@@ -26,7 +26,7 @@ from mutator.model import Experiment, Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.preflight import canary_check, unreached_triggers
 from mutator.preflight.check_run_problems import CheckRun, null_mutant_problem, read_check_run
-from mutator.store.run_folder import GoldenRun
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.run_progress import Progress, StagePace
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger

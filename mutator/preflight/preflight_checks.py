@@ -47,8 +47,9 @@ from mutator.store.checks_file import (
     unpackaged_modules_as_json,
 )
 from mutator.store.file_digests import FileDigest
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.preflight_results import CheckResult
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
@@ -121,14 +122,14 @@ class PreflightChecks:
     def __init__(self, workspace: Workspace, folder: RunFolder, secret: bytes) -> None:
         head = folder.head
         self.observation_store = ObservationStore(folder.scratch_folder, secret) if secret else None
-        self.workspace = workspace
+        self.workspace = workspace.with_scenarios_of(folder.path)
         self.folder = folder
         self.pending_folder = _pending_folder(folder)
         self.manifest: TargetManifest = workspace.manifest(head.target)
         self.models = workspace.fault_models()
         self.golden_runs = folder.golden_runs
         self.campaign = load_campaign_of_run(folder)
-        now = RunInputs.from_workspace(workspace, self.manifest, folder.scenarios).digest_by_source()
+        now = RunInputs.of_run(workspace, folder).digest_by_source()
         self.fault_by_variant = {fault.spec: fault for fault in plan_file.load_faults(folder.path).values()}
         places = sorted(
             (name, [i.location for i in f.injections]) for name, f in self.fault_by_variant.items()
@@ -136,7 +137,7 @@ class PreflightChecks:
         content = [
             now,
             run_environment.environment_affecting_results(),
-            head.goldens,
+            [golden_run.to_stored() for golden_run in self.golden_runs],
             head.seed,
             folder.canary.id if folder.canary else "",
             head.canary_hazard,

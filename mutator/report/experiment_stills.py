@@ -13,8 +13,9 @@ from mutator.model import Experiment, Record, Status
 from mutator.report.experiment_filming import ExperimentFilmer, Shot
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_ranks
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.planned_experiments import PlannedExperiments
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress, StagePace
 from mutator.workspace import Workspace
 

@@ -30,6 +30,7 @@ IRREPLACEABLE_FILES = (
     plan_file.EXPERIMENTS_FILE,
     plan_file.FAULTS_FILE,
     plan_file.BATCHES_FILE,
+    plan_file.SCENARIOS_FILE,
 )
 DIGESTED_TOP_FILES = (HEAD, CAMPAIGN_FILE, "plan.csv", "checks.json", "reviewed.json")
 _MOST_NAMED_EXPERIMENTS = 5  # in one message: the ids of a million experiments would fill it

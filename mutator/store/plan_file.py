@@ -28,6 +28,7 @@ from mutator.store.plan_lines import (
 EXPERIMENTS_FILE = "plan/experiments.jsonl"
 FAULTS_FILE = "plan/faults.jsonl"
 BATCHES_FILE = "plan/batches.jsonl"  # of a bench
+SCENARIOS_FILE = "plan/scenarios.jsonl"  # of a plan with families of scenarios
 
 _T = TypeVar("_T")
 Chunk = tuple[int, int, int]  # offset and length in bytes, number of experiments

@@ -3,12 +3,12 @@
 docs/reference/run-folder.md describes its files.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bounded
 from mutator._common.confined_files import path_below
@@ -21,10 +21,12 @@ from mutator.store import file_digests, integrity, plan_file
 from mutator.store.allowed_contents import SCRATCH_FOLDER, TRACES_FOLDER
 from mutator.store.appended_files import unfinished_growth_problems
 from mutator.store.checks_file import limits_of_run
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.packed_patches import PatchFolder
 from mutator.store.plain_contents_check import check_plain_contents
+from mutator.store.planned_scenarios import PlannedScenarios
 from mutator.store.records import load_records
-from mutator.store.run_head import HEAD, RunHead, StoredGolden, load_head
+from mutator.store.run_head import HEAD, RunHead, load_head
 from mutator.store.session_environments import SessionEnvironment
 from mutator.store.shards import Shard
 from mutator.store.timings import load_timings
@@ -34,35 +36,6 @@ STOP_AT_HAZARD_NOTE = "Runs end at their first terminal hazard: later hazards an
 DEFAULT_SERIES_BUDGET_MB = 500  # budget of a run's series, unless the plan sets another: some 80,000 of 6 kB
 MOST_LISTED_IDS = 20  # experiments that an ambiguous id could mean
 _MOST_READS = 3  # attempts to read a folder that its owner is writing
-
-
-class GoldenRun(NamedTuple):
-    """A fault-free run: scenario, changes and, if the plan has several seeds, its seed (else None)."""
-
-    scenario: str
-    changes: tuple[str, ...] = ()
-    seed: int | None = None
-
-    @classmethod
-    def for_experiment(cls, experiment: Experiment, *, several_seeds: bool) -> "GoldenRun":
-        """Return the golden run with which an experiment is compared."""
-        return cls(experiment.scenario, experiment.changes, experiment.seed if several_seeds else None)
-
-    @property
-    def key(self) -> str:
-        """The run's name: `S1`, `S1+alone`, or `S1+alone@7` with seed 7."""
-        name = "+".join((self.scenario, *self.changes))
-        return name if self.seed is None else f"{name}@{self.seed}"
-
-    @classmethod
-    def from_stored(cls, values: Sequence[Any]) -> "GoldenRun":
-        scenario, changes, *seed = values
-        return cls(scenario, tuple(changes), *seed)
-
-    def to_stored(self) -> StoredGolden:
-        """Return the values as run.json has them."""
-        golden = self.scenario, self.changes
-        return golden if self.seed is None else (*golden, self.seed)
 
 
 @dataclass(frozen=True)
@@ -217,11 +190,14 @@ class RunFolder:
 
     @cached_property
     def golden_runs(self) -> tuple[GoldenRun, ...]:
-        return tuple(map(GoldenRun.from_stored, self.head.goldens))
+        """All golden runs of the plan, those of concrete scenarios last."""
+        planned = PlannedScenarios.of(self.path)
+        return (*self.listed_goldens, *(planned.golden_runs() if planned else ()))
 
     @property
-    def scenarios(self) -> set[str]:
-        return {golden_run.scenario for golden_run in self.golden_runs}
+    def listed_goldens(self) -> tuple[GoldenRun, ...]:
+        """The golden runs of the library's scenarios, which run.json lists."""
+        return tuple(map(GoldenRun.from_stored, self.head.goldens))
 
     def golden_run_of(self, experiment: Experiment) -> GoldenRun:
         return GoldenRun.for_experiment(experiment, several_seeds=self.has_seeded_goldens)

@@ -74,6 +74,7 @@ class RunHead(TargetFacts, PlanFacts):
 
     phrases: Phrases = added_field(Phrases())
     goldens: tuple[StoredGolden, ...]
+    scenarios: Sha256 | None = added_field(None)  # of plan/scenarios.jsonl, if families gave any scenario
     canary: Mapping[str, Any] | None
     canary_hazard: str | None
     sources: Mapping[str, Sha256]

@@ -14,8 +14,8 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.experiment_runner import ExperimentRunner
 from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.model import Record
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_choices import Choices
-from mutator.store.run_folder import GoldenRun
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]

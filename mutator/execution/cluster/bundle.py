@@ -125,7 +125,7 @@ def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Itera
     for kind in TEMPLATE_FOLDER_GLOBS:
         for file in sorted(workspace.templates.glob(kind)):
             yield f"templates/{file.name}", read_bounded(checked_path_inside(workspace.templates, file))
-    for name in sorted(folder.scenarios):
+    for name in sorted({golden_run.scenario for golden_run in folder.golden_runs}):
         yield f"scenarios/{name}.yaml", read_bounded(workspace.scenario(name))
 
 

@@ -16,7 +16,7 @@ from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.preflight.check_run_problems import output_digest_of
-from mutator.store.run_folder import GoldenRun
+from mutator.store.golden_runs import GoldenRun
 from mutator.targets.manifest import TargetManifest
 
 _SOURCE_FOLDERS = ("manifest", "target", "overlay")  # folders of a bundle

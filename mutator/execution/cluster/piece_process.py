@@ -36,9 +36,9 @@ from mutator.execution.worker_runners import WorkerRunners
 from mutator.model import Experiment
 from mutator.preflight.check_run_problems import read_check_run
 from mutator.store.checksummed_blocks import block_bytes
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.packed_patches import pack_patches
 from mutator.store.records import record_as_json
-from mutator.store.run_folder import GoldenRun
 from mutator.store.series_packing import series_block
 from mutator.targets.required_packages import check_requirements
 

@@ -9,7 +9,7 @@ from mutator._common.confined_files import checked_relative_path, path_below
 from mutator._common.files import read_json
 from mutator.errors import MutatorError
 from mutator.model import Limits, MeasuredLimits
-from mutator.store.run_folder import GoldenRun
+from mutator.store.golden_runs import GoldenRun
 
 BUNDLE_SCHEMA = "bundle/1"
 META_FILE = "meta.json"

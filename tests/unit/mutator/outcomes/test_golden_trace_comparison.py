@@ -5,7 +5,7 @@ import pytest
 
 from mutator.outcomes.golden_trace_comparison import compare_traces
 from mutator.outcomes.trace_and_record_loading import with_golden_times
-from mutator.store.run_folder import GoldenRun
+from mutator.store.golden_runs import GoldenRun
 from mutator.targets.channels import Channel, Role
 
 T = np.arange(5) * 0.1

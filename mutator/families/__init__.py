@@ -1,0 +1,3 @@
+"""Families: scenarios with parameters (ISO 34501's logical scenarios), and the concrete scenarios that they
+give.
+"""
