@@ -30,7 +30,7 @@ from mutator.faults.library_readings import SpecReadings, load_readings
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
 from mutator.results.table_columns import check_column_names
-from mutator.store.planned_scenarios import PlannedScenarios
+from mutator.store.planned_scenarios import PlannedScenarios, planned_scenarios_of
 from mutator.stpa.accidents_and_hazards import HazardList, load_hazard_list
 from mutator.stpa.context_tables import ContextTable, load_context_table
 from mutator.stpa.hazard_analysis_yaml import (
@@ -245,7 +245,7 @@ class Workspace:
 
     def with_scenarios_of(self, run: Path) -> "Workspace":
         """Return the workspace with the concrete scenarios of a run folder."""
-        return replace(self, planned_scenarios=PlannedScenarios.of(run))
+        return replace(self, planned_scenarios=planned_scenarios_of(run))
 
     @property
     def families(self) -> Mapping[str, Path]:

@@ -8,6 +8,7 @@ from mutator._common.shipped_files import shipped_folder
 
 RUNS_FOLDER = Path("runs")
 RUN_HEAD_FILE = "run.json"  # the file that identifies a run folder
+SCRATCH_FOLDER = "work"  # of a run folder, while a command works on it
 _LIBRARY_FOLDER = "fault_library"
 _TEMPLATES_FOLDER = "templates"
 

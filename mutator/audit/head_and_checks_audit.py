@@ -17,6 +17,7 @@ from mutator.outcomes.trace_and_record_loading import trace_digest
 from mutator.store import file_digests, plan_file
 from mutator.store.checks_file import CHECKS_FILE as CHECKS
 from mutator.store.checks_file import CHECKS_SCHEMA
+from mutator.store.plan_lines import read_plan_lines
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.targets.manifest import TargetManifest
@@ -69,7 +70,7 @@ def seed_and_session_problems(folder: RunFolder) -> Problems:
 
 def recomputed_chunks(folder: RunFolder) -> tuple[plan_file.Chunk, ...]:
     """Return the offset, length and number of experiments of each chunk, for the numbers in run.json."""
-    lines = plan_file.read_plan_lines(folder.path / plan_file.EXPERIMENTS_FILE)
+    lines = read_plan_lines(folder.path / plan_file.EXPERIMENTS_FILE)
     chunks, offset = [], 0
     for *_, count in folder.head.chunks:
         length = sum(map(len, islice(lines, count)))

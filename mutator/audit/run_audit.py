@@ -19,6 +19,7 @@ from mutator.audit.head_and_checks_audit import (
 )
 from mutator.audit.record_audit import load_stored_records, mutant_problems, proof_problems, verdict_problems
 from mutator.audit.run_digests_and_seal import golden_digests
+from mutator.audit.scenario_audit import family_problems, planned_scenario_problems
 from mutator.audit.series_audit import audit_series
 from mutator.audit.table_audit import audit_tables
 from mutator.campaigns.plan import load_plan
@@ -96,7 +97,9 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
         source_check,
     ]
     if workspace and manifest:
-        fact_problems = target_fact_problems(folder, workspace, manifest)
+        fact_problems = chain(
+            target_fact_problems(folder, workspace, manifest), family_problems(folder, workspace)
+        )
         checks.append(
             AuditCheck.from_problems("facts about the target that follow from the library", 1, fact_problems)
         )
@@ -165,7 +168,7 @@ def _plan_problems(folder: RunFolder) -> Problems:
         target=campaign.target,
         chunks=recomputed_chunks(folder),
         limits=campaign.limits,
-        goldens=tuple(golden_run.to_stored() for golden_run in plan.goldens()),
+        goldens=tuple(golden_run.to_stored() for golden_run in plan.tally.listed_goldens),
         canary_hazard=campaign.canary.hazard if campaign.canary else None,
     )
     for key, stored, value in head.differences(expected_head):
@@ -173,6 +176,7 @@ def _plan_problems(folder: RunFolder) -> Problems:
             f"{shortened_text(value)}, which follows from {plan_file.EXPERIMENTS_FILE} and {CAMPAIGN_FILE}"
         )
         yield MutatorError(f"{key} {shortened_text(stored)}", where=run / HEAD, expected=expected)
+    yield from planned_scenario_problems(folder, plan)
     if FileDigest.of_file(run / PLAN_CSV) != FileDigest.of_bytes(plan_csv_bytes(plan)):
         yield MutatorError(
             "differs from the plan",

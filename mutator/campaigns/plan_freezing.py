@@ -17,6 +17,7 @@ from mutator._common.files import (
 )
 from mutator._common.folder_locks import OWNER_LOCK_FILE, lock_run_folder
 from mutator._common.hashing import as_json_types, digest
+from mutator._common.library_and_run_folder_search import SCRATCH_FOLDER
 from mutator._common.version import VERSION
 from mutator.campaigns.campaign_files import load_campaign_study
 from mutator.campaigns.phrase_collection import UsedPhraseSources, phrases_of_campaign
@@ -28,10 +29,9 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import file_digests, plan_file
-from mutator.store.allowed_contents import SCRATCH_FOLDER
 from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
 from mutator.store.plain_contents_check import check_plain_contents
-from mutator.store.planned_scenarios import scenario_lines
+from mutator.store.planned_scenarios import SCENARIOS_FILE, scenario_lines
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RUN_SCHEMA, Provenance, RunHead
 from mutator.store.session_progress import PROGRESS_FILE
@@ -118,7 +118,7 @@ def freeze_plan_in_owned_folder(
         return folder, tally
     used = UsedPhraseSources()
     tally, plan_digest, places, files = _write_plan_files(plan, out, used)
-    scenarios = files.get(plan_file.SCENARIOS_FILE)
+    scenarios = files.get(SCENARIOS_FILE)
     head = _build_head(plan, tally, plan_digest, workspace, places, used, scenarios).file_bytes()
     file_digests.save_ledger(out, DigestLedger(files=files | {HEAD: FileDigest.of_bytes(head)}))
     write_atomic(out / HEAD, head)  # last, because this file makes the folder a run folder
@@ -169,8 +169,8 @@ def _write_plan_files(
     }
     if scenarios := tally.planned_scenarios():
         content = scenario_lines(scenarios)
-        write_atomic(out / plan_file.SCENARIOS_FILE, content)
-        files[plan_file.SCENARIOS_FILE] = FileDigest.of_bytes(content)
+        write_atomic(out / SCENARIOS_FILE, content)
+        files[SCENARIOS_FILE] = FileDigest.of_bytes(content)
     return tally, plan_digest, writer.chunks, files
 
 

@@ -11,6 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import write_atomic
 from mutator._common.hashing import as_json_types, canonical_json, digest
 from mutator._common.version import VERSION
@@ -33,13 +34,16 @@ from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import BATCHES_FILE, EXPERIMENTS_FILE, FAULTS_FILE
+from mutator.store.plan_lines import read_plan_lines
+from mutator.store.planned_scenarios import SCENARIOS_FILE, PlannedScenario, scenario_lines
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RUN_SCHEMA, BenchFacts, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import Phrases
 from mutator.workspace import Workspace
 
-APPENDED_FILES = (EXPERIMENTS_FILE, FAULTS_FILE, PLAN_CSV, BATCHES_FILE)
+_FILES_OF_BATCH = (EXPERIMENTS_FILE, FAULTS_FILE, PLAN_CSV, BATCHES_FILE)
+APPENDED_FILES = (*_FILES_OF_BATCH, SCENARIOS_FILE)  # the last one only if a family gave a scenario
 
 
 @dataclass(slots=True)
@@ -107,6 +111,11 @@ class GrowingPlan:
         """The golden runs of the plan, with the canary's at the end unless an experiment has it."""
         return self._tally.golden_runs()
 
+    def family_of(self, scenario: str) -> str | None:
+        """Return the family that gave a planned scenario; None for one of the library."""
+        concrete = self._tally.concrete_by_name.get(scenario)
+        return concrete.family if concrete else None
+
     def golden_runs_with(self, experiments: Sequence[Experiment]) -> tuple[GoldenRun, ...]:
         """Return the golden runs that the plan has once these experiments are added."""
         of_batch = (GoldenRun.for_experiment(e, several_seeds=True) for e in experiments)
@@ -122,7 +131,15 @@ class GrowingPlan:
         self._files[FAULTS_FILE].add(b"".join(map(plan_file.fault_line, faults.values())))
         self._files[PLAN_CSV].add(plan_csv_lines(experiments))
         self._files[BATCHES_FILE].add(self._batches.line_of_next(len(experiments), reason))
+        planned = set(self._tally.golden_runs())
         self._count(experiments)
+        self._files[SCENARIOS_FILE].add(
+            scenario_lines(
+                PlannedScenario(scenario=scenario.scenario, goldens=goldens)
+                for scenario in self._tally.planned_scenarios()
+                if (goldens := tuple(run for run in scenario.goldens if run not in planned))
+            )
+        )
         self._write()
         return RunFolder(self._run.resolve())
 
@@ -151,17 +168,18 @@ class GrowingPlan:
 
     def _write(self) -> None:
         head = self._current_head().file_bytes()
-        digests = {name: file.digest for name, file in self._files.items()}
+        files = [file for file in self._files.values() if file.digest.size or file.name != SCENARIOS_FILE]
+        digests = {file.name: file.digest for file in files}
         digests[HEAD] = FileDigest.of_bytes(head)
         if RunFolder.exists(self._run):
             with file_digests.announcing_rewrites(self._run, digests, finished=False):
-                for file in self._files.values():
+                for file in files:
                     file.write_added()
                 write_atomic(self._run / HEAD, head)
             return
         plan_file.create_plan_folder(self._run)
         write_atomic(self._run / CAMPAIGN_FILE, self.campaign.file_bytes)
-        for file in self._files.values():
+        for file in files:
             file.write_added()
         digests[CAMPAIGN_FILE] = FileDigest.of_bytes(self.campaign.file_bytes)
         file_digests.save_ledger(self._run, DigestLedger(files=digests))
@@ -169,7 +187,7 @@ class GrowingPlan:
 
     def _read_existing(self) -> None:
         self._count(tuple(plan_file.iterate_experiments(self._run)))
-        for line in plan_file.read_plan_lines(self._run / BATCHES_FILE):
+        for line in read_plan_lines(self._run / BATCHES_FILE):
             self._batches.count += 1
             self._batches.last_digest = sha256(line).hexdigest()
 
@@ -208,7 +226,7 @@ class GrowingPlan:
         )
 
     def _current_head(self) -> RunHead:
-        goldens = self.golden_runs
+        goldens, scenarios = self._tally.listed_goldens, self._files[SCENARIOS_FILE].digest
         stored = RunFolder(self._run).head if RunFolder.exists(self._run) else self._head
         return replace(
             self._head,
@@ -218,7 +236,8 @@ class GrowingPlan:
             runs=len(self._run_keys),
             phrases=self._current_phrases(),
             goldens=tuple(golden.to_stored() for golden in goldens),
-            sources=self._sources({golden.scenario for golden in goldens}),
+            scenarios=scenarios.sha256 if scenarios.size else None,
+            sources=self._sources(),
             stretches=stored.stretches,
             chunks=tuple(self._chunks),
         )
@@ -241,9 +260,12 @@ class GrowingPlan:
         tables = map(self._workspace.context_table, self._workspace.context_tables)
         return frozenset((row.id, row.condition) for table in tables for row in table.rows)
 
-    def _sources(self, scenarios: set[str]) -> Mapping[str, str]:
-        new = scenarios - self._scenario_digests.keys()
-        inputs = RunInputs.from_workspace(self._workspace, self._manifest, new)
-        self._scenario_digests |= {name: inputs.digest_by_source()[f"scenario {name}"] for name in new}
-        of_scenarios = {f"scenario {name}": self._scenario_digests[name] for name in sorted(scenarios)}
-        return {**self._head.sources, **of_scenarios}
+    def _sources(self) -> Mapping[str, str]:
+        names = sorted({golden.scenario for golden in self._tally.listed_goldens})
+        files = {f"scenario {name}": self._workspace.scenario(name) for name in names}
+        families = sorted({concrete.family for concrete in self._tally.concrete_by_name.values()})
+        files |= {f"family {name}": self._workspace.family(name).path for name in families}
+        for source, path in files.items():
+            if source not in self._scenario_digests:  # the bench refuses a batch if a file was edited
+                self._scenario_digests[source] = digest(read_bounded(path))
+        return {**self._head.sources, **{source: self._scenario_digests[source] for source in files}}

@@ -10,7 +10,7 @@ from mutator._common.hashing import digest
 from mutator._common.pickled_values import PickledValue
 from mutator.campaigns.plan_tally import PlanTally
 from mutator.faults.fault_models import FaultModels
-from mutator.store.planned_scenarios import PlannedScenarios
+from mutator.store.planned_scenarios import PlannedScenarios, planned_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 
@@ -50,7 +50,7 @@ class RunInputs(PickledValue):
     @classmethod
     def of_run(cls, workspace: "Workspace", folder: RunFolder) -> "RunInputs":
         """Return the inputs of a run folder in a workspace; MutatorError as in `from_workspace`."""
-        planned = PlannedScenarios.of(folder.path)
+        planned = planned_scenarios_of(folder.path)
         inputs = cls.from_workspace(
             workspace, workspace.manifest(folder.head.target), {run.scenario for run in folder.listed_goldens}
         )

@@ -58,17 +58,20 @@ class BatchCheck:
         self._watch.check_unchanged()
         return batch
 
-    def note_scenario(self, scenario: str) -> Path:
-        """Watch the file of a scenario from now on, and return it."""
+    def note_scenario(self, scenario: str, family: str | None = None) -> Path:
+        """Watch the file of a scenario, and of its family, from now on; return that of the scenario."""
         if scenario not in self._scenario_files:
             path = self._workspace.scenario(scenario)
-            self._watch.add([path])
+            self._watch.add([path, *([self._workspace.family(family).path] if family else [])])
             self._scenario_files[scenario] = path
         return self._scenario_files[scenario]
 
     def _check_fits(self, experiment: Experiment) -> None:
         checked_name_not_path(experiment.scenario, "experiments")
-        file = self.note_scenario(experiment.scenario)
+        concrete = experiment.concrete
+        if concrete is not None and self._workspace.planned_scenarios is not None:
+            self._workspace.planned_scenarios.add(concrete)
+        file = self.note_scenario(experiment.scenario, concrete.family if concrete else None)
         values = {
             "scenario_digest": (experiment.scenario_digest, self._watch.digest_of(file)),
             "after_hazard": (str(experiment.after_hazard), str(self._campaign.after_hazard)),
@@ -106,7 +109,8 @@ def _check_can_be_stored(experiment: Experiment) -> None:
         misfits = [
             f"{field.name} {value!r}"
             for field in fields(Experiment)
-            if type(value := getattr(experiment, field.name)) is not type(getattr(stored, field.name))
+            if field.compare
+            and type(value := getattr(experiment, field.name)) is not type(getattr(stored, field.name))
         ]
     except (MutatorError, AttributeError, LookupError, TypeError, ValueError) as err:
         misfits = [f"{type(err).__name__}: {err}"]

@@ -6,6 +6,7 @@ the order in which batches are asked for. Several batches can be in flight.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,7 @@ from mutator.store import file_digests
 from mutator.store.appended_files import undo_unfinished_growth
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.planned_experiments import PlannedExperiments
+from mutator.store.planned_scenarios import PlannedScenarios
 from mutator.store.preflight_results import golden_digests
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
@@ -67,6 +69,7 @@ class Bench:
         self._earlier = earlier or EarlierBenches()
         self.path = path.resolve()
         self.calls = BenchCalls(self.path)
+        workspace = replace(workspace, planned_scenarios=PlannedScenarios(self.path))
         self._workspace, self._manifest = workspace, manifest
         check_requirements(manifest)
         self._requested_engine, self._engine = engine, choose_engine(engine, manifest)
@@ -237,7 +240,7 @@ class Bench:
     def _resume(self) -> None:
         folder = RunFolder(self.path)
         for golden_run in self._plan.golden_runs:
-            self._batch_check.note_scenario(golden_run.scenario)
+            self._batch_check.note_scenario(golden_run.scenario, self._plan.family_of(golden_run.scenario))
         self._checks.read(self.path, self._plan.golden_runs)
         self._session = self._open_session(folder)
         self._read_records()

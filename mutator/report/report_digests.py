@@ -15,19 +15,14 @@ from mutator._common.confined_files import (
 from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.folder_locks import OWNER_LOCK_FILE
 from mutator._common.hashing import digest
+from mutator._common.library_and_run_folder_search import SCRATCH_FOLDER
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.series_for_report_page import series_facts_for_page
 from mutator.store import file_digests
 from mutator.store import time_series_folder as series_store
-from mutator.store.allowed_contents import (
-    DAMAGED_FOLDER,
-    SCRATCH_FOLDER,
-    SIGNATURE_FILES,
-    TRACES_FOLDER,
-    is_allowed_top_name,
-)
+from mutator.store.allowed_contents import DAMAGED_FOLDER, SIGNATURE_FILES, TRACES_FOLDER, is_allowed_top_name
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_progress import PROGRESS_FILE
 from mutator.workspace import Workspace

@@ -2,10 +2,11 @@
 
 from fnmatch import fnmatchcase
 
+from mutator._common.library_and_run_folder_search import SCRATCH_FOLDER
 from mutator.store import file_digests
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD
 
-SCRATCH_FOLDER, DAMAGED_FOLDER, TRACES_FOLDER = "work", "damaged", "traces"
+DAMAGED_FOLDER, TRACES_FOLDER = "damaged", "traces"
 SIGNATURE_FILES = ("seal.json", "seal.json.sig")
 _EXPORTED_TABLES = ("results", "propagation", "timings")
 ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any text, including folders

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from mutator.model import Experiment
-from mutator.store.run_head import StoredGolden
+
+# scenario, changes; seed, if the plan has several
+StoredGolden = tuple[str, tuple[str, ...]] | tuple[str, tuple[str, ...], int]
 
 
 class GoldenRun(NamedTuple):

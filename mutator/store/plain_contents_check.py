@@ -13,8 +13,9 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from mutator._common.confined_files import entries_below, is_file_or_folder, is_too_deep, not_plain_error
+from mutator._common.library_and_run_folder_search import SCRATCH_FOLDER
 from mutator.errors import UnsafePath
-from mutator.store.allowed_contents import ALLOWED_FOLDERS, DAMAGED_FOLDER, SCRATCH_FOLDER, TRACES_FOLDER
+from mutator.store.allowed_contents import ALLOWED_FOLDERS, DAMAGED_FOLDER, TRACES_FOLDER
 
 # what targets wrote, and what `verify --repair` set aside; nothing in them is reached by its name
 _UNCHECKED_FOLDERS = (SCRATCH_FOLDER, DAMAGED_FOLDER, f"{TRACES_FOLDER}/*/{SCRATCH_FOLDER}")

@@ -3,13 +3,14 @@
 import json
 from bisect import bisect_right
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from hashlib import sha256
 from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, overload
 
-from mutator._common.bounded_reading import check_file_size, open_regular, read_bounded_lines
+from mutator._common.bounded_reading import check_file_size, open_regular
 from mutator._common.files import raising_disk_full, writing_atomic
 from mutator._common.hashing import as_json_types, canonical_json, non_default_added_fields
 from mutator._common.message_text import counted
@@ -22,13 +23,14 @@ from mutator.store.plan_lines import (
     id_on_line,
     parse_experiment,
     parse_fault,
+    read_plan_lines,
     values_hashed_into_id,
 )
+from mutator.store.planned_scenarios import planned_scenarios_of
 
 EXPERIMENTS_FILE = "plan/experiments.jsonl"
 FAULTS_FILE = "plan/faults.jsonl"
 BATCHES_FILE = "plan/batches.jsonl"  # of a bench
-SCENARIOS_FILE = "plan/scenarios.jsonl"  # of a plan with families of scenarios
 
 _T = TypeVar("_T")
 Chunk = tuple[int, int, int]  # offset and length in bytes, number of experiments
@@ -144,9 +146,8 @@ def read_chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
 
 def load_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> tuple[Experiment, ...]:
     path, count = run / EXPERIMENTS_FILE, chunk[2]
-    experiments = tuple(
-        _parse_experiments(path, ((None, line) for line in read_chunk_lines(run, chunk)), faults)
-    )
+    lines = ((None, line) for line in read_chunk_lines(run, chunk))
+    experiments = tuple(_with_concrete_scenarios(run, _parse_experiments(path, lines, faults)))
     if len(experiments) != count:
         got = f"{counted(len(experiments), 'experiment')} in a chunk of {count}"
         raise MutatorError(got, where=path, remedy=DAMAGED_PLAN_REMEDY)
@@ -192,17 +193,16 @@ class ExperimentsReadOnAccess(Sequence[Experiment]):
 
 def iterate_experiments(run: Path) -> Iterator[Experiment]:
     path = run / EXPERIMENTS_FILE
-    yield from _parse_experiments(path, _numbered_lines(path), load_faults(run))
+    yield from _with_concrete_scenarios(
+        run, _parse_experiments(path, _numbered_lines(path), load_faults(run))
+    )
 
 
-def read_plan_lines(path: Path) -> Iterator[bytes]:
-    try:
-        with open_regular(path) as file:
-            yield from read_bounded_lines(file, path)
-    except OSError as err:
-        raise MutatorError(
-            f"cannot be read ({err.strerror})", where=path, remedy=DAMAGED_PLAN_REMEDY
-        ) from None
+def _with_concrete_scenarios(run: Path, experiments: Iterable[Experiment]) -> Iterator[Experiment]:
+    planned = planned_scenarios_of(run)
+    for experiment in experiments:
+        found = planned and planned.by_name.get(experiment.scenario)
+        yield replace(experiment, concrete=found.scenario) if found else experiment
 
 
 def parse_experiment_line(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:

@@ -5,12 +5,14 @@ No other module reads them. The MutatorError for a damaged line lacks its file a
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from functools import lru_cache
 from hashlib import sha256
+from pathlib import Path
 from typing import Any, TypeVar
 
+from mutator._common.bounded_reading import open_regular, read_bounded_lines
 from mutator._common.confined_files import checked_name_not_path
 from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
@@ -45,6 +47,16 @@ _EXPERIMENT_ID_PATTERN = re.compile(r"[0-9a-f]{16}")
 _ID_FIELDS = ("fault", "scenario", "scenario_digest", "method", "trigger", "seed", "setting")
 
 _T = TypeVar("_T")
+
+
+def read_plan_lines(path: Path) -> Iterator[bytes]:
+    try:
+        with open_regular(path) as file:
+            yield from read_bounded_lines(file, path)
+    except OSError as err:
+        raise MutatorError(
+            f"cannot be read ({err.strerror})", where=path, remedy=DAMAGED_PLAN_REMEDY
+        ) from None
 
 
 def id_on_line(line: bytes) -> str:

@@ -8,7 +8,7 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.store import plan_file
 from mutator.store.indexed_lines import OpenFiles
-from mutator.store.plan_lines import id_on_line
+from mutator.store.plan_lines import id_on_line, read_plan_lines
 
 
 class PlannedExperiments(Mapping[str, Experiment]):
@@ -24,7 +24,7 @@ class PlannedExperiments(Mapping[str, Experiment]):
         self._index: dict[str, int] = {}
         self._offsets = array("Q", [0])
         offset = 0
-        for number, line in enumerate(plan_file.read_plan_lines(self._path)):
+        for number, line in enumerate(read_plan_lines(self._path)):
             self._offsets.append(offset := offset + len(line))
             try:
                 name = id_on_line(line)

@@ -4,8 +4,8 @@ A target reads a file; a scenario becomes one in the run's scratch folder when i
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,13 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import checked_name_not_path, path_below
 from mutator._common.files import raising_disk_full, write_atomic
 from mutator._common.hashing import canonical_json, parse_json
+from mutator._common.library_and_run_folder_search import SCRATCH_FOLDER
 from mutator.errors import MutatorError
 from mutator.model import ConcreteScenario
-from mutator.store.allowed_contents import SCRATCH_FOLDER
 from mutator.store.golden_runs import GoldenRun
-from mutator.store.plan_file import SCENARIOS_FILE, read_plan_lines
-from mutator.store.plan_lines import DAMAGED_PLAN_REMEDY
+from mutator.store.plan_lines import DAMAGED_PLAN_REMEDY, read_plan_lines
+
+SCENARIOS_FILE = "plan/scenarios.jsonl"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,16 +50,22 @@ class PlannedScenarios:
 
     run: Path
 
-    @staticmethod
-    def of(run: Path) -> "PlannedScenarios | None":
-        """Return the concrete scenarios of a run folder; None if its plan has none."""
-        return PlannedScenarios(run) if (run / SCENARIOS_FILE).is_file() else None
-
     @cached_property
-    def by_name(self) -> Mapping[str, PlannedScenario]:
-        return {planned.scenario.name: planned for planned in self._read()}
+    def by_name(self) -> dict[str, PlannedScenario]:
+        scenarios: dict[str, PlannedScenario] = {}
+        for planned in self._read():
+            # the plan of a bench names a scenario again when it has another golden run
+            before = scenarios.get(planned.scenario.name)
+            scenarios[planned.scenario.name] = (
+                replace(before, goldens=before.goldens + planned.goldens) if before else planned
+            )
+        return scenarios
 
-    @cached_property
+    def add(self, scenario: ConcreteScenario) -> None:
+        """Add a scenario that is going to be planned."""
+        self.by_name.setdefault(scenario.name, PlannedScenario(scenario=scenario, goldens=()))
+
+    @property
     def families(self) -> tuple[str, ...]:
         """The names of the families, sorted."""
         return tuple(sorted({planned.scenario.family for planned in self.by_name.values()}))
@@ -92,6 +99,8 @@ class PlannedScenarios:
 
     def _read(self) -> Iterator[PlannedScenario]:
         path = self.run / SCENARIOS_FILE
+        if not path.is_file():
+            return
         for number, line in enumerate(read_plan_lines(path), start=1):
             try:
                 planned = _parse(parse_json(line), path)
@@ -102,6 +111,20 @@ class PlannedScenarios:
                     "not a scenario of a plan", where=path, line=number, remedy=DAMAGED_PLAN_REMEDY
                 ) from None
             yield planned
+
+
+def planned_scenarios_of(run: Path) -> PlannedScenarios | None:
+    """Return the concrete scenarios of a run folder; None if its plan has none."""
+    try:
+        state = (run / SCENARIOS_FILE).stat()
+    except OSError:
+        return None
+    return _cached_scenarios(run, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=2)  # those of ten thousand scenarios take 20 MB
+def _cached_scenarios(run: Path, changed_ns: int, size: int) -> PlannedScenarios:
+    return PlannedScenarios(run)
 
 
 def _parse(values: Mapping[str, Any], path: Path) -> PlannedScenario:

@@ -14,17 +14,18 @@ from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bou
 from mutator._common.confined_files import path_below
 from mutator._common.files import check_path_encodable
 from mutator._common.hashing import as_json_types
+from mutator._common.library_and_run_folder_search import SCRATCH_FOLDER
 from mutator._common.message_text import shortened_ids
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import file_digests, integrity, plan_file
-from mutator.store.allowed_contents import SCRATCH_FOLDER, TRACES_FOLDER
+from mutator.store.allowed_contents import TRACES_FOLDER
 from mutator.store.appended_files import unfinished_growth_problems
 from mutator.store.checks_file import limits_of_run
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.packed_patches import PatchFolder
 from mutator.store.plain_contents_check import check_plain_contents
-from mutator.store.planned_scenarios import PlannedScenarios
+from mutator.store.planned_scenarios import planned_scenarios_of
 from mutator.store.records import load_records
 from mutator.store.run_head import HEAD, RunHead, load_head
 from mutator.store.session_environments import SessionEnvironment
@@ -191,7 +192,7 @@ class RunFolder:
     @cached_property
     def golden_runs(self) -> tuple[GoldenRun, ...]:
         """All golden runs of the plan, those of concrete scenarios last."""
-        planned = PlannedScenarios.of(self.path)
+        planned = planned_scenarios_of(self.path)
         return (*self.listed_goldens, *(planned.golden_runs() if planned else ()))
 
     @property

@@ -12,6 +12,7 @@ from mutator._common.library_and_run_folder_search import RUN_HEAD_FILE
 from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError, TypeMisfit
 from mutator.model import Limits
+from mutator.store.golden_runs import StoredGolden
 from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import Chunk
 from mutator.store.session_environments import SessionEnvironment
@@ -25,8 +26,6 @@ NameTuple = tuple[str, ...]
 Sha256 = str
 FirstAndLastSeed = tuple[int, int]
 OperatorSelectionText = str  # number of mutants of a selection of operators, and what was left out
-# scenario, changes; seed, if the plan has several
-StoredGolden = tuple[str, NameTuple] | tuple[str, NameTuple, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,7 +19,7 @@ from mutator.store.checksummed_blocks import block_bytes, read_blocks
 from mutator.store.checksummed_lines import read_segment, verified_lines
 from mutator.store.file_digests import FileDigest
 from mutator.store.packed_patches import COMPLETE_BLOCK, PatchFolder
-from mutator.store.plan_file import read_plan_lines
+from mutator.store.plan_lines import read_plan_lines
 from mutator.store.series_script import write_script
 from mutator.store.time_series_folder import load_index
 from tests.costs import is_cheap, is_refused
