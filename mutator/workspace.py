@@ -28,7 +28,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec, load_spec
 from mutator.faults.library_readings import SpecReadings, load_readings
 from mutator.faults.spec_expansion import expand_spec
-from mutator.model import Fault
+from mutator.model import ConcreteScenario, Fault
 from mutator.results.table_columns import check_column_names
 from mutator.store.planned_scenarios import PlannedScenarios, planned_scenarios_of
 from mutator.stpa.accidents_and_hazards import HazardList, load_hazard_list
@@ -255,6 +255,14 @@ class Workspace:
     def family(self, name: str | Path) -> Family:
         """Return the family of scenarios with this name or path."""
         return load_family(self._find_file("families", name, "family of scenarios"))
+
+    def concrete_scenario(self, text: str) -> ConcreteScenario | None:
+        """Return the scenario that `FAMILY:ego=60,gap=20` names; None for a name or file without values.
+
+        MutatorError for an unknown family, and for values that it does not have.
+        """
+        family, colon, values = text.partition(":")
+        return self.family(family).concrete_from_text(values) if colon else None
 
     @property
     def campaigns(self) -> Mapping[str, Path]:

@@ -11,6 +11,7 @@ from mutator._common.argument_checks import check_whole_number
 from mutator.api.campaigns import describe_unfinished
 from mutator.api.experiments import ExperimentBuilder, checked_after_hazard
 from mutator.api.runs import Run
+from mutator.api.scenario_choice import ScenarioLike
 from mutator.api.target_and_fault_selection import (
     FaultLike,
     SelectedTarget,
@@ -117,7 +118,7 @@ class Bench:
     def build_experiment(
         self,
         fault: FaultLike,
-        scenario: str,
+        scenario: ScenarioLike,
         trigger: TriggerLike = "always",
         *,
         value: float | None = None,

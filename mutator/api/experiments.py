@@ -4,9 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from mutator._common.argument_checks import check_number, check_whole_number
-from mutator._common.bounded_reading import read_bounded
-from mutator._common.hashing import digest
 from mutator._common.message_text import describe_choices
+from mutator.api.scenario_choice import (
+    ScenarioLike,
+    concrete_scenario_of,
+    digest_of_library_scenario,
+)
 from mutator.api.target_and_fault_selection import (
     FaultLike,
     SelectedTarget,
@@ -21,7 +24,7 @@ from mutator.triggers.trigger_kinds import CONDITION_NAME, held_for, named_with_
 
 def build_experiment(
     fault: FaultLike,
-    scenario: str,
+    scenario: ScenarioLike,
     trigger: TriggerLike = "always",
     *,
     value: float | None = None,
@@ -42,7 +45,8 @@ def build_experiment(
     * `hold_s`: how long the fault stays active after its trigger first fires, in s. The trigger's name then
       says it: `at 3 s for 2 s`. A campaign says so only if its list has several holds of the trigger; for the
       id of another one, take the trigger from its plan, and no `hold_s`.
-    * `scenario`: a name in the library. `setting`: changes of it, which the manifest names.
+    * `scenario`: a name in the library, or a family with values: `r157_deceleration:ego=60,gap=20`.
+    * `setting`: changes of the scenario, which the manifest names.
     * `after_hazard`: `stop` ends the run at its first terminal hazard.
 
     MutatorError for an invalid argument.
@@ -71,7 +75,7 @@ class ExperimentBuilder:
     def build(
         self,
         fault: FaultLike,
-        scenario: str,
+        scenario: ScenarioLike,
         trigger: TriggerLike = "always",
         *,
         value: float | None = None,
@@ -95,27 +99,21 @@ class ExperimentBuilder:
         if hold_s is not None:
             chosen_trigger = _held_trigger(chosen_fault, chosen_trigger, hold_s)
         self._check_setting(setting)
+        workspace = self.selected_target.workspace
+        concrete = concrete_scenario_of(workspace, scenario)
         return Experiment(
             fault=chosen_fault,
-            scenario=scenario,
-            scenario_digest=self._scenario_digest(scenario),
+            scenario=concrete.name if concrete else str(scenario),
+            scenario_digest=concrete.digest
+            if concrete
+            else digest_of_library_scenario(workspace, str(scenario)),
             method=Method.GUIDED,
             trigger=chosen_trigger,
             seed=seed,
             setting=tuple(setting),
             after_hazard=checked_after_hazard(after_hazard),
+            concrete=concrete,
         )
-
-    def _scenario_digest(self, scenario: str) -> str:
-        names = self.selected_target.workspace.scenarios
-        if scenario not in names:
-            raise MutatorError(
-                f"no scenario '{scenario}'",
-                argument="scenario",
-                expected=f"{describe_choices(names)}, as in the library",
-                remedy="correct the name, or add the file to the library",
-            )
-        return digest(read_bounded(self.selected_target.workspace.scenario(scenario)))
 
     def _check_condition(self, trigger: Trigger) -> None:
         try:

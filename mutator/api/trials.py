@@ -9,6 +9,7 @@ from mutator._common.confined_files import check_only_plain_files, checked_path_
 from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
+from mutator.api.scenario_choice import ScenarioLike, concrete_scenario_of
 from mutator.api.target_and_fault_selection import FaultLike, SelectedTarget, TriggerLike, WorkspaceLike
 from mutator.campaigns.phrase_collection import phrases_of_experiment
 from mutator.campaigns.run_inputs import RunInputs
@@ -116,7 +117,7 @@ class Trial(ExperimentResult):
 
 def try_fault(
     fault: FaultLike,
-    scenario: str | Path,
+    scenario: ScenarioLike,
     trigger: TriggerLike = "always",
     *,
     value: float | None = None,
@@ -130,21 +131,26 @@ def try_fault(
     """Inject one fault and run the scenario twice, once without the fault.
 
     `fault` and `trigger` are as for `build_mutant`; contexts, `always` and conditions are armed after
-    `armed_after_s` (s; default: the manifest's). `scenario` is a name or a file. Output goes to a new folder
+    `armed_after_s` (s; default: the manifest's). `scenario` is a name, a file, or a
+    family with values: `r157_deceleration:ego=60,gap=20`. Output goes to a new folder
     in `out`; default: a temporary folder, deleted with the Trial.
 
     MutatorError for a mistake in the arguments, CheckFailed if the golden run fails. A crash of the
     controller or a harness error is a result: see `Trial.status`.
     """
     selected_target = SelectedTarget.of(workspace, target)
-    file = selected_target.workspace.scenario(scenario)
+    concrete = concrete_scenario_of(selected_target.workspace, scenario)
+    name = concrete.name if concrete else str(scenario)
     experiment = Experiment(
         fault=selected_target.fault(fault, value=value, seed=seed, reading=reading),
-        scenario=str(scenario),
-        scenario_digest=digest(read_bounded(file)),
+        scenario=name,
+        scenario_digest=concrete.digest
+        if concrete
+        else digest(read_bounded(selected_target.workspace.scenario(name))),
         method=Method.GUIDED,
         trigger=selected_target.trigger(trigger, armed_after_s),
         seed=seed,
+        concrete=concrete,
     )
     temporary = ScratchFolder("mutator-try-") if out is None else None
     out_folder = temporary.path if temporary else Path(out or "")
@@ -152,7 +158,7 @@ def try_fault(
     folder = checked_path_inside(out_folder, path_below(out_folder, experiment.id))
     check_only_plain_files(folder)
     single = run_single(selected_target.workspace, selected_target.manifest, experiment, folder)
-    inputs = RunInputs.from_workspace(selected_target.workspace, selected_target.manifest, [str(scenario)])
+    inputs = RunInputs.of_experiments(selected_target.workspace, selected_target.manifest, [experiment])
     StoredTrial(
         target=selected_target.manifest.name,
         sources=inputs.digest_by_source(),

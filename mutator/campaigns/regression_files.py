@@ -18,7 +18,12 @@ from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.store import plan_file
-from mutator.store.plan_lines import experiment_from_json, fault_from_json
+from mutator.store.plan_lines import (
+    concrete_as_json,
+    experiment_from_json,
+    fault_from_json,
+    with_stored_concrete,
+)
 from mutator.targets.hazard_severity import SeverityScale
 
 SCHEMA = "regression/1"
@@ -33,6 +38,7 @@ class SavedExperimentModel(StrictModel, title="A saved experiment"):
     expect: YamlRecord[Expectation] = Field(description="What its result may be.")
     experiment: dict[str, Any] = Field(description="The experiment.")
     fault: dict[str, Any] = Field(description="Its fault.")
+    concrete: dict[str, Any] | None = Field(None, description="Its scenario, if a family gave it.")
 
 
 class RegressionModel(StrictModel, title="The file"):
@@ -126,6 +132,8 @@ def save_regression(
         "experiment": plan_file.experiment_as_json(experiment),
         "fault": json.loads(plan_file.fault_line(experiment.fault)),
     }
+    if experiment.concrete is not None:
+        entry["concrete"] = concrete_as_json(experiment.concrete)
     lines = [f"{key}: {_json(value)}\n" for key, value in entry.items() if value != ""]
     before = read_bounded(path) if path.exists() else None
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -145,7 +153,8 @@ def _experiment_of(entry: SavedExperimentModel, source: YamlSource, number: int)
     try:
         _check_types(entry)
         fault = fault_from_json(entry.fault)
-        return experiment_from_json(entry.experiment, {fault.id: fault})
+        experiment = experiment_from_json(entry.experiment, {fault.id: fault})
+        return with_stored_concrete(experiment, {"concrete": entry.concrete} if entry.concrete else {})
     except (MutatorError, *_PARSE_ERRORS) as err:
         raise source.error(
             ("experiments", number),

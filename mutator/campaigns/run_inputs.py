@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
 from mutator._common.pickled_values import PickledValue
-from mutator.campaigns.plan_tally import PlanTally
 from mutator.faults.fault_models import FaultModels
+from mutator.model import Experiment
 from mutator.store.planned_scenarios import PlannedScenarios, planned_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 
 if TYPE_CHECKING:
+    from mutator.campaigns.plan_tally import PlanTally
     from mutator.workspace import Workspace
 
 
@@ -41,7 +42,17 @@ class RunInputs(PickledValue):
         return cls(manifest=manifest, fault_models=workspace.fault_models(), scenario_files=files)
 
     @classmethod
-    def of_plan(cls, workspace: "Workspace", manifest: TargetManifest, tally: PlanTally) -> "RunInputs":
+    def of_experiments(
+        cls, workspace: "Workspace", manifest: TargetManifest, experiments: Iterable[Experiment]
+    ) -> "RunInputs":
+        """Return the inputs of experiments that are in no plan; MutatorError as in `from_workspace`."""
+        concrete_by_name = {experiment.scenario: experiment.concrete for experiment in experiments}
+        scenarios = [name for name, concrete in concrete_by_name.items() if concrete is None]
+        families = {concrete.family for concrete in concrete_by_name.values() if concrete is not None}
+        return cls.from_workspace(workspace, manifest, scenarios)._with_families(workspace, families)
+
+    @classmethod
+    def of_plan(cls, workspace: "Workspace", manifest: TargetManifest, tally: "PlanTally") -> "RunInputs":
         """Return the inputs of a plan that is in no run folder; MutatorError as in `from_workspace`."""
         inputs = cls.from_workspace(workspace, manifest, {run.scenario for run in tally.listed_goldens})
         families = {concrete.family for concrete in tally.concrete_by_name.values()}

@@ -66,6 +66,8 @@ def library_problems(workspace: Workspace, target: str) -> list[MutatorError]:
     if manifest and models and collector.result_of(lambda: build(manifest, models, None, always_trigger())):
         for spec in specs:
             collector.problems += spec_problems(spec, models, manifest) if spec else ()
+    for name in workspace.families:
+        collector.result_of(partial(workspace.family, name))
     if readings:
         collector.problems += campaign_problems(workspace, readings, manifest)
     # the analysis compares specs with context tables, so it needs all of them to be valid

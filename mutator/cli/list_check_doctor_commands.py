@@ -1,5 +1,6 @@
 """`list`, `check`, `doctor`: show the library, check it against the target, check the machine."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from enum import StrEnum
@@ -25,6 +26,7 @@ class EntryKind(StrEnum):
 
     SPECS = "specs"
     SCENARIOS = "scenarios"
+    FAMILIES = "families"
     CAMPAIGNS = "campaigns"
     MODELS = "models"
     TRIGGERS = "triggers"
@@ -59,7 +61,7 @@ def list_library(
     *,
     workspace_options: WorkspaceOptions,
 ) -> None:
-    """List specs, scenarios, campaigns, models, triggers, targets."""
+    """List specs, scenarios, families, campaigns, models, triggers, targets."""
     terminal = Terminal(as_json, wide)
     workspace = workspace_options.workspace()
     tables = {k.value: LIST_BY_KIND[k](workspace) for k in ([kind] if kind else list(EntryKind))}
@@ -87,6 +89,22 @@ def _list_specs(workspace: "Workspace") -> ColumnsAndRows:
 
 def _list_scenarios(workspace: "Workspace") -> ColumnsAndRows:
     return _list_files(workspace.scenarios, "title")
+
+
+def _list_families(workspace: "Workspace") -> ColumnsAndRows:
+    rows: list[dict[str, Any]] = []
+    for name in workspace.families:
+        family = workspace.family(name)
+        parameters = "; ".join(f"{p.name}: {p.describe_values()}" for p in family.parameters)
+        rows.append(
+            {
+                "name": name,
+                "scenarios": math.prod(len(p.values) for p in family.parameters),
+                "parameters": parameters,
+                "title": _as_one_line(family.title),
+            }
+        )
+    return ["name", "scenarios", "parameters", "title"], rows
 
 
 def _list_campaigns(workspace: "Workspace") -> ColumnsAndRows:
@@ -138,6 +156,7 @@ def _list_targets(workspace: "Workspace") -> ColumnsAndRows:
 LIST_BY_KIND: dict[EntryKind, Callable[["Workspace"], ColumnsAndRows]] = {
     EntryKind.SPECS: _list_specs,
     EntryKind.SCENARIOS: _list_scenarios,
+    EntryKind.FAMILIES: _list_families,
     EntryKind.CAMPAIGNS: _list_campaigns,
     EntryKind.MODELS: _list_fault_models,
     EntryKind.TRIGGERS: _list_triggers,

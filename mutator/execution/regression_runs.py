@@ -70,9 +70,9 @@ class RegressionRun(FileRun):
 
     def _default_run_folder(self) -> Path:
         file = self._file
-        scenarios = {entry.experiment.scenario for entry in file.experiments}
         manifest = self._workspace.manifest(file.target)
-        sources = self._key_of_sources(RunInputs.from_workspace(self._workspace, manifest, scenarios))
+        experiments = [entry.experiment for entry in file.experiments]
+        sources = self._key_of_sources(RunInputs.of_experiments(self._workspace, manifest, experiments))
         ids = [entry.experiment.id for entry in file.experiments]
         key = content_id([ids, self.path.name, *sources])
         return path_below(campaign_runs_folder(), f"regressions-{key}")

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -23,6 +23,7 @@ from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.preflight.check_run_problems import read_check_run
 from mutator.store import plan_file
+from mutator.store.planned_scenarios import PlannedScenarios
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.required_packages import check_requirements
@@ -56,6 +57,10 @@ def run_single(
 
     faulty/ is empty if the mutant could not be built. Raises CheckFailed if the golden run fails.
     """
+    if experiment.concrete is not None:
+        planned = PlannedScenarios(out)
+        planned.add(experiment.concrete)
+        workspace = replace(workspace, planned_scenarios=planned)
     golden_limits = limits or limits_before_measuring(Limits())
     with _engine_in_folder(manifest, out, golden_limits) as engine:
         if golden is None:

@@ -144,6 +144,11 @@ class Family:
             ) from None
 
 
+def argument_of(scenario: ConcreteScenario) -> str:
+    """Return the text that names a concrete scenario: `FAMILY:ego_kph=60,gap_m=20`."""
+    return f"{scenario.family}:{','.join(f'{key}={value}' for key, value in scenario.values.items())}"
+
+
 def _number_text(value: object) -> str:
     if isinstance(value, float):
         rounded = round(value, _DECIMALS)

@@ -84,7 +84,7 @@ class Parameter:
         """Return the value in `text`; MutatorError unless it lies within the parameter's values."""
         value = _parse_number(text) if self.is_number else text
         if value is not None and value in self.values:
-            return next(known for known in self.values if known == value)
+            return next(possible for possible in self.values if possible == value)
         if isinstance(value, int | float) and min(self.numbers) <= value <= max(self.numbers):
             return value
         raise MutatorError(

@@ -6,6 +6,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.execution.cluster import cluster_files
+from mutator.families import family_yaml
 from mutator.faults import fault_specs
 from mutator.faults.library_readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.library_readings import ReadingsModel
@@ -60,6 +61,38 @@ def render_campaigns_page(workspace: Workspace) -> str:
         "contexts; `sample` "
         "draws some of them.\nThe same file and options produce the same plan everywhere.\n",
         *model_sections("campaign.md", campaign_model.CampaignModel),
+    )
+
+
+def render_families_page(workspace: Workspace) -> str:
+    example = min((workspace.library / "families").glob("*.yaml")).read_text(encoding="utf-8")
+    return _join_page(
+        generated_page_head("Families of scenarios"),
+        "A family is a scenario with parameters (ISO 34501 calls it a logical scenario). Its place in the "
+        "library is\n`fault_library/families/<name>.yaml`. Campaigns draw concrete scenarios from it: "
+        "`scenarios: [{family: NAME, sample: 100}]`.\n`mutator try SPEC --scenario NAME:ego=60,gap=20` "
+        "drives one.\n",
+        f"The first key is `schema: {family_yaml.FAMILY_SCHEMA}`. {_STRICT_YAML_LINKS}\n",
+        f"```yaml\n{example.rstrip()}\n```\n",
+        "A concrete scenario is the rendered template. Its name is that of the family and the first 12 digits of\n"
+        "the text's digest. The run folder has the texts of all scenarios of its plan, in one file.\n",
+        *model_sections("family.md", family_yaml.FamilyModel),
+        "## The template\n",
+        "The template is text in the target's own format, with [Jinja](https://jinja.palletsprojects.com) "
+        "expressions in `{{ }}`, conditions\nin `{% if %}` and loops in `{% for %}`. Numbers are written "
+        "with at most nine decimals. Like all templates, it is\n[restricted](../explanation/trust.md): it reads "
+        "no files, calls no functions and ends soon.\n",
+        "## Sampling\n",
+        "| method | scenarios |\n|---|---|\n"
+        "| `grid` | all combinations of values that meet the constraints, or so many of them, evenly spread "
+        "in the order of the file |\n"
+        "| `random` | drawn independently |\n"
+        "| `latin_hypercube` | each parameter's range is cut into as many equal parts as there are "
+        "scenarios, and each part is used once |\n"
+        "| `sobol` | the Sobol sequence, shifted by a random vector |\n",
+        "All but `grid` follow the parameters' distributions and depend on the plan's first seed. A draw "
+        "that breaks a constraint, or that is\nalready there, is replaced by the next. The first scenarios of "
+        "`random` and `sobol` are the same for each `sample`.\n",
     )
 
 

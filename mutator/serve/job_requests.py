@@ -177,7 +177,7 @@ class RequestChecker:
             raise _unknown_name_error("spec", request.spec, [other.name for other in self.workspace.specs()])
         variants = [variant.name for variant in spec]
         for what, requested, accepted in (
-            ("scenario", request.scenario, self.workspace.scenarios),
+            ("scenario", request.scenario, self._accepted_scenarios(request.scenario)),
             ("variant", request.variant, variants),
             ("reading", request.reading, self.workspace.readings().names),
             ("target", request.target, self.workspace.targets),
@@ -204,6 +204,11 @@ class RequestChecker:
             argv=arguments,
             requesting_page=TRIAL_PAGE,
         )
+
+    def _accepted_scenarios(self, scenario: str) -> Collection[str]:
+        """Return the scenarios of the library, and `scenario` if it is that of a family."""
+        names = self.workspace.scenarios
+        return [*names, scenario] if self.workspace.concrete_scenario(scenario) else names
 
     def _campaign_command(self, request: CampaignRequest) -> JobCommand:
         if request.campaign not in self.workspace.campaigns:

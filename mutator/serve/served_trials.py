@@ -10,6 +10,7 @@ from mutator.campaigns.phrase_collection import phrases_of_experiment
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.config.units import UNITS
 from mutator.errors import MutatorError, NotServed
+from mutator.families.family import argument_of
 from mutator.faults.fault_specs import FaultSpec, Variant
 from mutator.model import Experiment, Status, Trigger
 from mutator.outcomes.series_sampling import SeriesSampler
@@ -66,7 +67,7 @@ class ServedTrials:
         return view | {"request": request, "range": self._range_of(trial.experiment)}
 
     def _check_unchanged(self, trial: StoredTrial, manifest: TargetManifest) -> None:
-        inputs = RunInputs.from_workspace(self._workspace, manifest, [trial.experiment.scenario])
+        inputs = RunInputs.of_experiments(self._workspace, manifest, [trial.experiment])
         current = inputs.digest_by_source()
         if changed := [name for name, digest in trial.sources.items() if current.get(name) != digest]:
             raise MutatorError(
@@ -112,7 +113,7 @@ def _request_repeating(trial: StoredTrial) -> dict[str, Any]:
         "kind": "try",
         "spec": spec,
         "variant": variant,
-        "scenario": experiment.scenario,
+        "scenario": argument_of(experiment.concrete) if experiment.concrete else experiment.scenario,
         "trigger": _trigger_text(experiment.trigger),
         "value": fault.value if isinstance(fault.value, int | float) else None,
         "seed": experiment.seed,

@@ -201,8 +201,8 @@ def iterate_experiments(run: Path) -> Iterator[Experiment]:
 def _with_concrete_scenarios(run: Path, experiments: Iterable[Experiment]) -> Iterator[Experiment]:
     planned = planned_scenarios_of(run)
     for experiment in experiments:
-        found = planned and planned.by_name.get(experiment.scenario)
-        yield replace(experiment, concrete=found.scenario) if found else experiment
+        of_family = planned.by_name.get(experiment.scenario) if planned else None
+        yield replace(experiment, concrete=of_family.scenario) if of_family else experiment
 
 
 def parse_experiment_line(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:

@@ -6,20 +6,21 @@ No other module reads them. The MutatorError for a damaged line lacks its file a
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
 from mutator._common.bounded_reading import open_regular, read_bounded_lines
-from mutator._common.confined_files import checked_name_not_path
+from mutator._common.confined_files import checked_name_not_path, checked_relative_path
 from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 from mutator.model import (
     AfterHazard,
     Anchor,
     AnchorKind,
+    ConcreteScenario,
     Experiment,
     Fault,
     FaultLocation,
@@ -162,6 +163,8 @@ def experiment_from_json(data: Mapping[str, Any], faults: Mapping[str, Fault]) -
             remedy=DAMAGED_PLAN_REMEDY,
         )
     checked_name_not_path(str(data["scenario"]), "plan")
+    if "concrete" in data:
+        raise ValueError("a scenario in an experiment")
     trigger = data["trigger"]
     values = {name: value for name, value in data.items() if name != "id"}
     converted = {
@@ -180,6 +183,34 @@ def experiment_from_json(data: Mapping[str, Any], faults: Mapping[str, Fault]) -
             remedy=DAMAGED_PLAN_REMEDY,
         )
     return experiment
+
+
+def concrete_as_json(scenario: ConcreteScenario) -> dict[str, Any]:
+    """Convert a concrete scenario to JSON types."""
+    values = {name: getattr(scenario, name) for name in ("family", "label", "text")}
+    return values | {"values": dict(scenario.values)}
+
+
+def concrete_from_json(data: Mapping[str, Any]) -> ConcreteScenario:
+    """Read a concrete scenario; ValueError, LookupError or TypeError if it is none."""
+    texts = {name: data[name] for name in ("family", "label", "text")}
+    numbers = data["values"].values()
+    if not all(isinstance(text, str) for text in texts.values()) or any(
+        type(value) not in (int, float, str) for value in numbers
+    ):
+        raise ValueError("not a concrete scenario")
+    checked_relative_path(texts["family"], "plan", allow_folders=False)
+    return ConcreteScenario(**texts, values=data["values"])
+
+
+def with_stored_concrete(experiment: Experiment, data: Mapping[str, Any]) -> Experiment:
+    """Return the experiment with the scenario under `concrete`, if any; ValueError for another scenario."""
+    if "concrete" not in data:
+        return experiment
+    concrete = concrete_from_json(data["concrete"])
+    if (concrete.name, concrete.digest) != (experiment.scenario, experiment.scenario_digest):
+        raise ValueError(f"the scenario {concrete.name}")
+    return replace(experiment, concrete=concrete)
 
 
 def fault_from_json(data: Mapping[str, Any]) -> Fault:

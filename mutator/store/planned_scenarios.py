@@ -11,14 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import checked_name_not_path, path_below
+from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full, write_atomic
 from mutator._common.hashing import canonical_json, parse_json
 from mutator._common.library_and_run_folder_search import SCRATCH_FOLDER
 from mutator.errors import MutatorError
 from mutator.model import ConcreteScenario
 from mutator.store.golden_runs import GoldenRun
-from mutator.store.plan_lines import DAMAGED_PLAN_REMEDY, read_plan_lines
+from mutator.store.plan_lines import (
+    DAMAGED_PLAN_REMEDY,
+    concrete_as_json,
+    concrete_from_json,
+    read_plan_lines,
+)
 
 SCENARIOS_FILE = "plan/scenarios.jsonl"
 
@@ -32,16 +37,9 @@ class PlannedScenario:
 
     def line(self) -> bytes:
         """Return the scenario as a line of the plan."""
-        scenario = self.scenario
-        values = {
-            "family": scenario.family,
-            "goldens": [golden.to_stored()[1:] for golden in self.goldens],  # without the scenario's name
-            "label": scenario.label,
-            "name": scenario.name,
-            "text": scenario.text,
-            "values": dict(scenario.values),
-        }
-        return canonical_json(values).encode() + b"\n"
+        goldens = [golden.to_stored()[1:] for golden in self.goldens]  # without the scenario's name
+        values = {"goldens": goldens, "name": self.scenario.name}
+        return canonical_json(concrete_as_json(self.scenario) | values).encode() + b"\n"
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ class PlannedScenarios:
             return
         for number, line in enumerate(read_plan_lines(path), start=1):
             try:
-                planned = _parse(parse_json(line), path)
+                planned = _parse(parse_json(line))
                 if planned.line() != line:
                     raise ValueError("not canonical")
             except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
@@ -127,13 +125,8 @@ def _cached_scenarios(run: Path, changed_ns: int, size: int) -> PlannedScenarios
     return PlannedScenarios(run)
 
 
-def _parse(values: Mapping[str, Any], path: Path) -> PlannedScenario:
-    scenario = ConcreteScenario(
-        family=checked_name_not_path(values["family"], path),
-        values=values["values"],
-        label=values["label"],
-        text=values["text"],
-    )
+def _parse(values: Mapping[str, Any]) -> PlannedScenario:
+    scenario = concrete_from_json(values)
     goldens = tuple(GoldenRun.from_stored([scenario.name, *rest]) for rest in values["goldens"])
     return PlannedScenario(scenario=scenario, goldens=goldens)
 

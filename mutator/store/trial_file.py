@@ -11,7 +11,12 @@ from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record
 from mutator.store import plan_file
-from mutator.store.plan_lines import experiment_from_json, fault_from_json
+from mutator.store.plan_lines import (
+    concrete_as_json,
+    experiment_from_json,
+    fault_from_json,
+    with_stored_concrete,
+)
 from mutator.store.records import record_as_json
 
 TRIAL_SCHEMA, TRIAL_FILE = "trial/1", "trial.json"
@@ -33,6 +38,8 @@ class StoredTrial:
             "experiment": plan_file.experiment_as_json(self.experiment) | {"fault": fault},
             "record": as_json_types(record_as_json(self.record)),
         }
+        if self.experiment.concrete is not None:
+            content["concrete"] = concrete_as_json(self.experiment.concrete)
         write_below(folder, TRIAL_FILE, json_bytes(content))
 
     @classmethod
@@ -42,12 +49,11 @@ class StoredTrial:
         try:
             stored = parse_json_object(read_below(folder, TRIAL_FILE), path, TRIAL_SCHEMA)
             fault = fault_from_json(stored["experiment"]["fault"])
+            experiment = experiment_from_json(stored["experiment"] | {"fault": fault.id}, {fault.id: fault})
             return cls(
                 target=str(stored["target"]),
                 sources={str(name): str(digest) for name, digest in stored["sources"].items()},
-                experiment=experiment_from_json(
-                    stored["experiment"] | {"fault": fault.id}, {fault.id: fault}
-                ),
+                experiment=with_stored_concrete(experiment, stored),
                 record=typed_value_from_json(Record, stored["record"]),
             )
         except OSError:
