@@ -91,7 +91,7 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
         ),
         AuditCheck.from_problems(
             "golden runs that match the checks",
-            len(folder.golden_runs),
+            _golden_run_count(folder),
             chain(checks_of(folder), _golden_problems(folder), idle),
         ),
         source_check,
@@ -144,6 +144,13 @@ def _content_problems(folder: RunFolder) -> Problems:
                 expected="patches as a worker appended them",
                 remedy=f"`mutator verify {folder.path} --repair` sets them aside",
             )
+
+
+def _golden_run_count(folder: RunFolder) -> int:
+    try:
+        return len(folder.golden_runs)
+    except MutatorError:  # a damaged file, which another check reports
+        return len(folder.head.goldens)
 
 
 def _plan_problems(folder: RunFolder) -> Problems:

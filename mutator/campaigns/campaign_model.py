@@ -3,7 +3,15 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    WithJsonSchema,
+    model_validator,
+)
 from pydantic_core import PydanticKnownError
 
 from mutator._common.extension_doors import OPERATOR_DOOR
@@ -128,6 +136,12 @@ class FamilyScenariosModel(StrictModel, title="Scenarios of a family"):
         return self
 
 
+_Scenarios = Annotated[
+    Annotated[str, Tag("name")] | Annotated[FamilyScenariosModel, Tag("family")],
+    Discriminator(lambda item: "family" if isinstance(item, dict | FamilyScenariosModel) else "name"),
+]
+
+
 class SeedsModel(StrictModel, title="Seeds"):
     """The seeds with which the campaign is repeated."""
 
@@ -150,7 +164,7 @@ class CampaignModel(StrictModel, title="The file"):
         None, description="The [study](../how-to/add-a-study.md) with which its reports compare the results."
     )
     target: str = Field(description="The name of the target's manifest.")
-    scenarios: list[str | FamilyScenariosModel] = Field(
+    scenarios: list[_Scenarios] = Field(
         min_length=1,
         description="The scenarios by name, each once, and scenarios of families: "
         "`[S1, {family: r157_deceleration, sample: 100}]`.",

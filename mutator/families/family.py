@@ -93,7 +93,10 @@ class Family:
 
     def _value_from_text(self, parameter: Parameter, text_by_name: Mapping[str, str]) -> ParameterValue:
         if parameter.name in text_by_name:
-            return parameter.parse(text_by_name[parameter.name])
+            text = text_by_name[parameter.name]
+            if (value := parameter.parse(text)) is not None:
+                return value
+            raise self._value_error(f"{parameter.name}={text}", parameter.describe_values())
         if len(parameter.values) == 1:
             return parameter.values[0]
         raise self._value_error(

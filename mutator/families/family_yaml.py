@@ -6,7 +6,7 @@ from pathlib import Path
 from statistics import NormalDist
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from mutator._common.message_text import describe_choices
 from mutator.config.units import split_key_at_unit
@@ -97,11 +97,18 @@ class FrequencyModel(StrictModel, title="A frequency"):
     )
 
 
-_Values = (
-    RangeModel
-    | Annotated[list[_NUMBER_OR_WHOLE], Field(min_length=1)]
-    | Annotated[list[str], Field(min_length=1)]
-)
+def _kind_of_values(values: object) -> str:
+    if not isinstance(values, list):
+        return "range"
+    return "texts" if values and isinstance(values[0], str) else "numbers"
+
+
+_Values = Annotated[
+    Annotated[RangeModel, Tag("range")]
+    | Annotated[list[_NUMBER_OR_WHOLE], Tag("numbers")]
+    | Annotated[list[str], Tag("texts")],
+    Discriminator(_kind_of_values),
+]
 
 
 class FamilyModel(StrictModel, title="families/*.yaml"):
@@ -183,7 +190,13 @@ def _build_parameter(
     if isinstance(values, RangeModel):
         numbers, shape = values.values(), values.shape()
         probabilities = probabilities_of_shape(shape, numbers, values.step) if shape else None
-        return Parameter(name=name, key=key, unit=unit, values=numbers, probabilities=probabilities)
+        return Parameter(
+            name=name, key=key, unit=unit, values=numbers, probabilities=probabilities, is_range=True
+        )
+    if not values:
+        raise source.error(
+            keys, "no value", expected="at least one", remedy="list the values, or give a range"
+        )
     for i, value in enumerate(values):
         if value in values[:i]:
             raise source.error((*keys, i), f"{value} is listed twice", remedy="remove one of the two")

@@ -10,7 +10,6 @@ from statistics import NormalDist
 
 from mutator._common.message_text import describe_choices
 from mutator.config.units import UNITS, Unit, convert_unit
-from mutator.errors import MutatorError
 
 ParameterValue = int | float | str
 
@@ -34,6 +33,7 @@ class Parameter:
     unit: Unit | None
     values: Sequence[ParameterValue]  #: all possible values, in the order of the file
     probabilities: Sequence[float] | None = None  #: of each value when it is drawn; None: equal ones
+    is_range: bool = False  #: whether values between those of the range can be given by hand
 
     @property
     def is_number(self) -> bool:
@@ -80,21 +80,21 @@ class Parameter:
         text = value if isinstance(value, str) else f"{value:g}"
         return f"{self.name} {text}" + (f" {self.unit.symbol}" if self.unit else "")
 
-    def parse(self, text: str) -> ParameterValue:
-        """Return the value in `text`; MutatorError unless it lies within the parameter's values."""
+    def parse(self, text: str) -> ParameterValue | None:
+        """Return the value in `text`; None unless it is one of the values, or within a range."""
         value = _parse_number(text) if self.is_number else text
-        if value is not None and value in self.values:
-            return next(possible for possible in self.values if possible == value)
-        if isinstance(value, int | float) and min(self.numbers) <= value <= max(self.numbers):
+        if (
+            self.is_range
+            and isinstance(value, int | float)
+            and min(self.numbers) <= value <= max(self.numbers)
+        ):
             return value
-        raise MutatorError(
-            f"{self.name}={text}", expected=self.describe_values(), remedy="give a value of the family's file"
-        )
+        return next((possible for possible in self.values if possible == value), None)
 
     def describe_values(self) -> str:
-        """Return all values as text: a list of up to ten, else the least and the greatest."""
+        """Return all values as text."""
         symbol = f" {self.unit.symbol}" if self.unit else ""
-        if not self.is_number or len(self.values) <= 10:
+        if not self.is_range:
             return describe_choices([f"{value}" for value in self.values]) + symbol
         least, greatest = min(self.numbers), max(self.numbers)
         return f"a number from {least} to {greatest}{symbol}"

@@ -74,14 +74,14 @@ def render_families_page(workspace: Workspace) -> str:
         "drives one.\n",
         f"The first key is `schema: {family_yaml.FAMILY_SCHEMA}`. {_STRICT_YAML_LINKS}\n",
         f"```yaml\n{example.rstrip()}\n```\n",
-        "A concrete scenario is the rendered template. Its name is that of the family and the first 12 digits of\n"
-        "the text's digest. The run folder has the texts of all scenarios of its plan, in one file.\n",
+        "A concrete scenario is the rendered template. Its name is that of the family and the first 12 "
+        "digits of\nthe text's digest. A run folder has the texts of all scenarios of its plan.\n",
         *model_sections("family.md", family_yaml.FamilyModel),
         "## The template\n",
         "The template is text in the target's own format, with [Jinja](https://jinja.palletsprojects.com) "
         "expressions in `{{ }}`, conditions\nin `{% if %}` and loops in `{% for %}`. Numbers are written "
-        "with at most nine decimals. Like all templates, it is\n[restricted](../explanation/trust.md): it reads "
-        "no files, calls no functions and ends soon.\n",
+        "with at most nine decimals. Like all templates, it is\n[restricted](../explanation/trust.md): it "
+        "reads no files, calls no functions and ends soon.\n",
         "## Sampling\n",
         "| method | scenarios |\n|---|---|\n"
         "| `grid` | all combinations of values that meet the constraints, or so many of them, evenly spread "
@@ -91,8 +91,8 @@ def render_families_page(workspace: Workspace) -> str:
         "scenarios, and each part is used once |\n"
         "| `sobol` | the Sobol sequence, shifted by a random vector |\n",
         "All but `grid` follow the parameters' distributions and depend on the plan's first seed. A draw "
-        "that breaks a constraint, or that is\nalready there, is replaced by the next. The first scenarios of "
-        "`random` and `sobol` are the same for each `sample`.\n",
+        "that breaks a constraint, or that is\nalready there, is replaced by the next. The first scenarios "
+        "of `random` and `sobol` are the same for each `sample`.\n",
     )
 
 

@@ -1,0 +1,153 @@
+"""Campaigns, benches and trials in scenarios that families give, driven on the toy car."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator._common.files import json_bytes
+from mutator.campaigns.plan import build_plan
+from mutator.errors import MutatorError
+from mutator.execution.campaign_running import run_campaign
+from mutator.model import Experiment
+from mutator.store import file_digests
+from mutator.store.file_digests import FileDigest
+from mutator.store.plan_choices import Choices
+from mutator.store.planned_scenarios import SCENARIOS_FILE
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+FAMILY = """\
+schema: family/1
+name: follow
+title: The lead ahead brakes gently
+source: A test
+parameters:
+  ego_mps: {from: 14, to: 20, step: 1}
+  gap_m: [30, 40]
+  lead_mps: [18, 22]
+constraints: [lead_mps > ego_mps - 3]
+template: |
+  steps: 120
+  speed: {{ ego_mps }}
+  gap: {{ gap_m }}
+  lead_speed: {{ lead_mps }}
+  lead_brakes: 0
+"""
+
+
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:no golden run reaches the trigger", "ignore:no experiment reached a hazard"
+)
+
+
+@pytest.fixture
+def families(toy: Workspace) -> Workspace:
+    """The toy car with a family, and a campaign in its scenarios and in A."""
+    (toy.library / "families").mkdir()
+    (toy.library / "families" / "follow.yaml").write_text(FAMILY)
+    campaign = toy.library / "campaigns" / "toy.yaml"
+    text = campaign.read_text().replace("[A, B]", "[A, {family: follow, sample: 3, sampling: sobol}]")
+    campaign.write_text(text.replace("sample: 24", "sample: 16"))
+    return toy
+
+
+def test_engines_and_sessions_give_the_same_bytes_in_a_family(families: Workspace, tmp_path: Path) -> None:
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    assert run_campaign(families, "toy", whole, engine="fork").exit_code == 0
+    for number in (1, 2):
+        shard = Choices(shard=f"{number}/2")
+        out = tmp_path / f"shard{number}"
+        mutator.run("toy", workspace=families, out=out, choices=shard, engine="reference")
+    mutator.merge_runs([tmp_path / "shard1", tmp_path / "shard2"], parts)
+    assert (parts / "results.csv").read_bytes() == (whole / "results.csv").read_bytes()
+    folder = RunFolder.open(whole)
+    assert RunFolder.open(parts).head.plan == folder.head.plan
+    assert {golden.scenario for golden in folder.listed_goldens} == {"A"}
+    assert len({golden.scenario for golden in folder.golden_runs}) == 4
+    assert "family follow" in folder.head.sources
+    assert mutator.verify(whole, workspace=families).differences == ()
+
+
+def test_an_edited_scenario_is_found(families: Workspace, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    mutator.plan("toy", workspace=families, out=run)
+    path = run / SCENARIOS_FILE
+    lines = path.read_text().splitlines(keepends=True)
+    for old, new in (
+        ('"gap_m":40', '"gap_m":30'),
+        ("speed: ", "speed: 1"),
+        ('"goldens":[[[]],[["alone"]]]', '"goldens":[[[]]]'),
+    ):
+        changed = "".join(lines).replace(old, new)
+        assert changed != "".join(lines), old
+        path.write_text(changed)
+        forge_digests(run)
+        assert mutator.verify(run, workspace=families).differences, old
+    path.write_text("".join(lines))
+    forge_digests(run)
+    assert mutator.verify(run, workspace=families).differences == ()
+
+
+def forge_digests(run: Path) -> None:
+    """Make run.json and digests.json match the file of scenarios, as somebody would who hides an edit."""
+    head = json.loads((run / "run.json").read_text())
+    head["scenarios"] = FileDigest.of_file(run / SCENARIOS_FILE).sha256
+    (run / "run.json").write_bytes(json_bytes(head))
+    ledger = file_digests.load_ledger(run)
+    files = {name: FileDigest.of_file(run / name) for name in ledger.files}
+    file_digests.save_ledger(run, file_digests.DigestLedger(files=files))
+
+
+def test_a_bench_takes_scenarios_of_families(families: Workspace, tmp_path: Path) -> None:
+    out = tmp_path / "bench"
+    with mutator.open_bench(families, out, target="toycar") as bench:
+        first = bench.build_experiment("sensor/distance/longer", "follow:ego=14,gap=30,lead=18", "2")
+        [record] = bench.run([first])
+        second = bench.build_experiment("sensor/distance/longer", "follow:ego=15,gap=30,lead=18", "2")
+        assert len(bench.run([first, second])) == 2
+    assert record.experiment_id == first.id
+    assert mutator.verify(out, workspace=families).differences == ()
+    with mutator.open_bench(families, out, target="toycar") as bench:
+        assert bench.run([first])[0] == record
+
+
+def test_a_trial_in_a_scenario_of_a_family(families: Workspace) -> None:
+    trial = mutator.try_fault(
+        "sensor/distance/longer", "follow:ego=14,gap=30,lead=18", "2", workspace=families, target="toycar"
+    )
+    assert trial.status is mutator.Status.OK
+    assert trial.experiment.scenario.startswith("follow-")
+
+
+def test_seeds_share_the_scenarios_of_the_first(families: Workspace) -> None:
+    campaign = families.library / "campaigns" / "toy.yaml"
+    campaign.write_text(campaign.read_text().replace("seed: 7", "seeds: {from: 7, to: 8}"))
+    experiments: list[Experiment] = [*build_plan(families, "toy").experiments]
+    by_seed = {seed: {e.scenario for e in experiments if e.seed == seed} for seed in (7, 8)}
+    assert by_seed[7] == by_seed[8]
+    others = {e.scenario for e in build_plan(families, "toy", Choices(seed=8)).experiments}
+    assert others != by_seed[8]
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("{family: fellow, sample: 3}", "no family of scenarios 'fellow'.*did you mean 'follow'"),
+        ("{family: follow, sample: 300}", "only 28 scenarios"),
+        ("{family: follow, sampling: dice}", "`sampling`"),
+        ("{family: ../x}", "'../x'|no family"),
+        ("{family: follow, sampling: sobol}", "without a `sample`"),
+        ("{family: follow}, {family: follow}", "'family follow' is listed twice"),
+    ],
+)
+def test_a_mistake_in_a_campaign_is_refused_with_its_line(
+    families: Workspace, entry: str, message: str
+) -> None:
+    campaign = families.library / "campaigns" / "toy.yaml"
+    text = campaign.read_text().replace("{family: follow, sample: 3, sampling: sobol}", entry)
+    campaign.write_text(text)
+    with pytest.raises(MutatorError, match=message) as refusal:
+        build_plan(families, "toy")
+    assert refusal.value.line == 5
