@@ -98,6 +98,8 @@ class _KeyTables:
 
     def _type_text(self, value: dict[str, Any]) -> str:
         """Return a JSON Schema type as text; for optional keys, null is left out."""
+        if "oneOf" in value:  # with a rule that chooses one
+            value = {**value, "anyOf": value["oneOf"]}
         if "anyOf" in value:
             types = [v.get("type") for v in value["anyOf"]]
             # "number" includes whole numbers
