@@ -50,6 +50,7 @@ def begin_checks(
         return None
     anchors = checks.judge_anchors()
     raise_if_failed(folder, [anchors])
+    checks.remove_stored_results()  # they hold for other versions, and no longer once an experiment runs
     return ChecksBesideExperiments(checks, anchors, workers)
 
 

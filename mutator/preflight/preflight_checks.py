@@ -8,7 +8,7 @@ from typing import Any
 
 from mutator._common import cached_folders
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import path_below
+from mutator._common.confined_files import path_below, unlink_below
 from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
@@ -226,6 +226,14 @@ class PreflightChecks:
         }
         self._store_in_run_folder(checks)
         return results
+
+    def remove_stored_results(self) -> None:
+        """Remove the results of an earlier session, so that a run which is killed has no checks that the
+        versions of its last experiments did not pass.
+        """
+        if (self.folder.path / CHECKS_FILE).is_file():
+            with file_digests.announcing_rewrites(self.folder.path, {CHECKS_FILE: None}):
+                unlink_below(self.folder.path, CHECKS_FILE)
 
     def store_in_cache(self) -> None:
         """Store passed checks for other run folders."""
