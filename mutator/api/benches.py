@@ -61,7 +61,7 @@ def open_bench(
     * `reading`, `after_hazard`: what all experiments have. `seed` decides what the proof draws.
     * `workers`: number of processes. `engine` and `reuse`: as for `run`.
     * `cluster`, `insecure_network`: as for `run`. What was asked for is dealt to the cluster once a record is
-      waited for, and a connection lasts until all of it is done; `workers` are for the checks.
+      waited for; the workers stay until the end of the block. `workers` are for the checks.
 
     MutatorError for an invalid argument, and if `out` holds another run or is in use. After the block, an
     IncompleteRun warning is issued if experiments have no result.

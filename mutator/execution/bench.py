@@ -367,7 +367,7 @@ class Bench:
         assert self._session is not None
         if self._has_crew_old_limits:  # workers have the limits with which they began
             self._receive_records(self._awaited.running)
-            self._crew.close()
+            self._crew.use_new_limits()
             self._has_crew_old_limits = False
         self._begin_work()
         batch = CrewBatch(

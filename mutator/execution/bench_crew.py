@@ -85,6 +85,10 @@ class BenchCrew:
         for worker in self._workers:
             worker.is_ready.wait()
 
+    def use_new_limits(self) -> None:
+        """End the workers, which have the limits with which they began. The next batch starts others."""
+        self.close()
+
     def stop(self) -> None:
         """Make the work of another thread fail, and accept no more."""
         self._is_stopped = True

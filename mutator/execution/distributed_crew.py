@@ -8,6 +8,7 @@ from mutator.campaigns.chunks import chunks_with
 from mutator.execution.bench_crew import CrewBatch, crew_error
 from mutator.execution.progress_reporting import reporting_progress
 from mutator.execution.session import Session
+from mutator.execution.staying_distributor import StayingDistributor
 from mutator.model import Record
 from mutator.preflight.equivalence_check import SampledExperiment
 from mutator.store.records import PROOF_FOLDER, RECORDS_FOLDER
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class DistributedCrew:
-    """Runs batches by a distributor, which ends when its work is done.
+    """Runs batches by a distributor, whose workers stay between batches if it can keep them.
 
     Nothing runs until a record is asked for: then all batches that wait are dealt together. So nothing is
     written into the run folder while its plan grows, and Ctrl-C reaches the distributor. `session_of` returns
@@ -36,6 +37,9 @@ class DistributedCrew:
         self._waiting: list[CrewBatch] = []
         self._arrived: deque[Record] = deque()
         self._is_stopped = False
+        self._staying = distributor if isinstance(distributor, StayingDistributor) else None
+        if self._staying:
+            self._staying.stay_open()
 
     def hand_out(self, batch: CrewBatch) -> None:
         """Let a batch wait for its distribution. MutatorError once the crew was stopped."""
@@ -52,19 +56,25 @@ class DistributedCrew:
         return self._arrived.popleft()
 
     def wait_until_ready(self) -> None:
-        """Nothing runs between two calls."""
+        """Nothing reads the run folder between two calls."""
+
+    def use_new_limits(self) -> None:
+        """Leave it to the distributor to give its workers the limits of the run folder."""
 
     def stop(self) -> None:
         """Accept no more. What another thread has distributed comes to its end."""
         self._is_stopped = True
 
     def close(self) -> None:
-        """Nothing is open between two calls."""
+        """End the workers."""
+        if self._staying:
+            self._staying.close()
 
     def kill(self) -> None:
-        """Forget what waits. Finished lines stay."""
+        """Forget what waits, and end the workers. Finished lines stay."""
         self._waiting.clear()
         self._arrived.clear()
+        self.close()
 
     def _distribute(self) -> None:
         batches, self._waiting = self._waiting, []

@@ -89,7 +89,7 @@ def test_processes_that_dask_starts_get_a_safe_path(monkeypatch: pytest.MonkeyPa
     for before in (None, "0"):
         if before is not None:
             monkeypatch.setenv("PYTHONSAFEPATH", before)
-        with dask_connections.applying_scheduler_settings():
+        with dask_connections.starting_processes_safely():
             assert os.environ["PYTHONSAFEPATH"] == "1"
         assert os.environ.get("PYTHONSAFEPATH") == before
 

@@ -2,6 +2,7 @@
 batches* keeps its word.
 """
 
+import json
 import os
 import random
 import re
@@ -97,6 +98,82 @@ def test_a_cluster_gives_the_same_seal(toycar: Workspace, tmp_path: Path) -> Non
     assert second.seal == first.seal is not None
     assert second.verify().differences == ()
     assert any("cluster" in path.name for path in (tmp_path / "cluster" / "records").iterdir())
+
+
+_ASK_TWICE = """
+import json, os, signal, sys, time
+from pathlib import Path
+import mutator
+
+def processes(word):
+    \"\"\"Return the ids of descendants with a word in their command.\"\"\"
+    found, todo = [], [os.getpid()]
+    while todo:
+        for path in Path(f"/proc/{todo.pop()}/task").glob("*/children"):
+            for pid in map(int, path.read_text().split()):
+                todo.append(pid)
+                if word in Path(f"/proc/{pid}/cmdline").read_text().split("\\0"):
+                    found.append(pid)
+    return sorted(found)
+
+def golden_runs():
+    cache = Path(os.environ["XDG_CACHE_HOME"]) / "mutator" / "goldens"
+    return {path.name: path.stat().st_mtime_ns for path in sorted(cache.iterdir())}
+
+def note(bench, *asked):
+    records = bench.run([bench.build_experiment("sensor/distance/longer", *words, value=value)
+        for *words, value in asked])
+    assert [record.status for record in records] == ["ok"] * len(asked), records
+    pieces = processes("mutator.execution.cluster.piece_process")
+    workers = [pid for pid in processes("--multiprocessing-fork")]
+    safe_path = os.environ.get("PYTHONSAFEPATH")
+    told.append({"workers": workers, "pieces": pieces, "goldens": golden_runs(), "safe": safe_path})
+
+if __name__ == "__main__":
+    told, (library, out) = [], sys.argv[1:3]
+    workspace = mutator.Workspace.find(root=library)
+    with mutator.open_bench(workspace, out, campaign="small", reuse=False, cluster="local:2") as bench:
+        first = [("A", 1.0 + 0.5 * number, 5 + number) for number in range(10)]
+        note(bench, *first)
+        note(bench, *[(scenario, start, value + 20) for scenario, start, value in first])
+        note(bench, *[("B", start, value) for _, start, value in first])
+        os.kill(told[-1]["workers"][0], signal.SIGKILL)
+        deadline = time.monotonic() + 60
+        while len(processes("--multiprocessing-fork")) < 2 and time.monotonic() < deadline:
+            time.sleep(0.1)
+        note(bench, *[("B", start, value + 20) for _, start, value in first])
+    left = processes("mutator.execution.cluster.piece_process") + processes("--multiprocessing-fork")
+    print(json.dumps([told, left, os.environ.get("PYTHONSAFEPATH")]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("kept_checks")
+def test_the_workers_of_a_cluster_stay_between_batches(toycar: Workspace, tmp_path: Path) -> None:
+    """The second batch meets the same processes and drives no golden run again; the third drives that of its
+    scenario alone; a worker that dies is replaced; the end leaves nothing, and nothing of it is in the
+    environment.
+    """
+    pytest.importorskip("distributed")
+    script = tmp_path / "ask.py"  # Dask's workers import the script
+    script.write_text(_ASK_TWICE)
+    words = [sys.executable, str(script), str(toycar.library.parent), str(tmp_path / "run")]
+    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    answer = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
+    assert answer.returncode == 0, answer.stderr
+    (first, second, third, fourth), left, safe_path = json.loads(answer.stdout.splitlines()[-1])
+    assert len(first["workers"]) == 2 and second["workers"] == third["workers"] == first["workers"]
+    assert {*first["pieces"]} <= {*second["pieces"]} <= {*third["pieces"]} and len(third["pieces"]) == 2
+    assert len(first["goldens"]) == 1 and len(third["goldens"]) == 2
+    assert second["goldens"] == first["goldens"] and first["goldens"].items() <= third["goldens"].items()
+    assert len(fourth["workers"]) == 2 and first["workers"][0] not in fourth["workers"]
+    assert len({*fourth["pieces"]} & {*third["pieces"]}) == 1 and len(fourth["pieces"]) <= 2
+    assert fourth["goldens"] == third["goldens"]
+    assert left == []
+    assert [first["safe"], second["safe"], third["safe"], safe_path] == [None] * 4
+    run = mutator.load_run(tmp_path / "run", workspace=toycar)
+    assert run.seal is not None and len(run.records) == 40
+    assert run.verify().differences == ()
 
 
 @pytest.mark.slow

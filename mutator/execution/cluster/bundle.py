@@ -22,6 +22,7 @@ from mutator._common.confined_files import (
     checked_relative_path,
     files_inside,
     path_below,
+    write_below,
 )
 from mutator._common.files import raising_disk_full, read_json
 from mutator._common.hashing import as_json_types
@@ -59,6 +60,17 @@ class Bundle:
         """
         parts = dict(_bundle_parts(workspace, folder, engine))
         _check_names_and_size(parts, workspace.library)
+        return cls._pack(parts)
+
+    @classmethod
+    def pack_growth(cls, workspace: Workspace, folder: RunFolder, engine: str) -> "Bundle":
+        """Pack what changes in a bundle when the plan of a bench grows: golden runs, and their scenarios."""
+        parts = dict(_growing_parts(workspace, folder, engine))
+        _check_names_and_size(parts, workspace.library)
+        return cls._pack(parts)
+
+    @classmethod
+    def _pack(cls, parts: Mapping[str, bytes]) -> "Bundle":
         data = pack_parcel(parts)
         return cls(data, sha256(data).hexdigest())
 
@@ -93,7 +105,7 @@ def _check_size(size: int, where: Path) -> None:
         )
 
 
-def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tuple[str, bytes]]:
+def _growing_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tuple[str, bytes]]:
     head = folder.head
     manifest = workspace.manifest(head.target)
     digests = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]
@@ -112,7 +124,14 @@ def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Itera
         "manifest": manifest.path.name,
         "sandbox": workspace.sandbox,
     }
+    for name in sorted({golden_run.scenario for golden_run in folder.golden_runs}):
+        yield f"scenarios/{name}.yaml", read_bounded(workspace.scenario(name))
     yield META_FILE, json.dumps(meta).encode()
+
+
+def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tuple[str, bytes]]:
+    yield from _growing_parts(workspace, folder, engine)
+    manifest = workspace.manifest(folder.head.target)
     yield f"manifest/{manifest.path.name}", read_bounded(manifest.path)
     tree = manifest.tree
     for path, data in tree.files.items():
@@ -125,8 +144,6 @@ def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Itera
     for kind in TEMPLATE_FOLDER_GLOBS:
         for file in sorted(workspace.templates.glob(kind)):
             yield f"templates/{file.name}", read_bounded(checked_path_inside(workspace.templates, file))
-    for name in sorted({golden_run.scenario for golden_run in folder.golden_runs}):
-        yield f"scenarios/{name}.yaml", read_bounded(workspace.scenario(name))
 
 
 def _files_named_by_arguments(manifest: TargetManifest) -> Iterator[Path]:
@@ -149,6 +166,19 @@ def unpack_bundle(data: bytes, folder: Path) -> None:
             path = path_below(folder, name)  # a new folder has no links
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
+
+
+def unpack_growth(data: bytes, folder: Path) -> None:
+    """Write new golden runs and their scenarios into the bundle in `folder`, whose processes go on reading
+    it; MutatorError for other files.
+    """
+    parts = unpack_parcel(data)
+    _check_names_and_size(parts, folder)
+    for name in parts:
+        if name != META_FILE and not name.startswith("scenarios/"):
+            raise UnsafePath(f"the name {name!a}", where=folder, expected="golden runs and scenarios only")
+    for name, content in parts.items():  # the description, which names the others, comes last
+        write_below(folder, name, content)
 
 
 def load_run_inputs(bundle: UnpackedBundle) -> RunInputs:

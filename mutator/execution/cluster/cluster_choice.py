@@ -23,6 +23,7 @@ from mutator.execution.cluster.dask_connections import (
     is_closed_to_others,
     open_network_error,
     requiring_extra,
+    safe_nanny_class,
 )
 
 if TYPE_CHECKING:
@@ -120,6 +121,7 @@ class NewLocalCluster:
             cluster: Any = LocalCluster(
                 n_workers=self.worker_count,
                 threads_per_worker=1,
+                worker_class=safe_nanny_class(),
                 host="127.0.0.1",
                 dashboard_address="127.0.0.1:0",
                 local_directory=folder,

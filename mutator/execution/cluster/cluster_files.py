@@ -27,6 +27,7 @@ from mutator.execution.cluster.dask_connections import (
     load_tls_certificates,
     open_network_error,
     requiring_extra,
+    starting_processes_safely,
 )
 
 if TYPE_CHECKING:
@@ -104,7 +105,8 @@ class ClusterFile:
             with self._converting_errors():
                 cluster = cluster_class(asynchronous=True, n_workers=0, **options)
             try:
-                await self._start_cluster(cluster, insecure, problems)
+                with starting_processes_safely():
+                    await self._start_cluster(cluster, insecure, problems)
             except BaseException:
                 with suppress(Exception):  # the cause is already known
                     await cluster.close()

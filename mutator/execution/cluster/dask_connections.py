@@ -5,8 +5,9 @@ import ipaddress
 import os
 import re
 import ssl
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractContextManager, asynccontextmanager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -84,14 +85,32 @@ def requiring_extra(extra: str) -> Iterator[None]:
         ) from None
 
 
-@contextmanager
-def applying_scheduler_settings() -> Iterator[None]:
-    """Apply Dask settings for a scheduler in this process.
+class _SharedContext:
+    """A context of the whole process: it begins with its first user and ends with its last, in any order."""
 
-    A frozen worker is noticed within a minute. Dask does not profile its threads, which saves CPU time. The
-    link to the dashboard uses the only address on which the dashboard answers. Processes that Dask starts
-    import nothing from their working folder.
-    """
+    def __init__(self, make: Callable[[], AbstractContextManager[None]]) -> None:
+        self._make, self._lock = make, threading.Lock()
+        self._user_count = 0
+        self._context: AbstractContextManager[None] = nullcontext()
+
+    @contextmanager
+    def use(self) -> Iterator[None]:
+        with self._lock:
+            if not self._user_count:
+                self._context = self._make()
+                self._context.__enter__()
+            self._user_count += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._user_count -= 1
+                if not self._user_count:
+                    self._context.__exit__(None, None, None)
+
+
+@contextmanager
+def _setting_dask_up() -> Iterator[None]:
     import dask
 
     settings = {
@@ -100,15 +119,49 @@ def applying_scheduler_settings() -> Iterator[None]:
         "distributed.admin.tick.interval": "500ms",
         "distributed.dashboard.link": "{scheme}://127.0.0.1:{port}/status",
     }
+    with dask.config.set(settings):
+        yield
+
+
+@contextmanager
+def _setting_safe_path() -> Iterator[None]:
     before = os.environ.get("PYTHONSAFEPATH")
     os.environ["PYTHONSAFEPATH"] = "1"
     try:
-        with dask.config.set(settings):
-            yield
+        yield
     finally:
         os.environ.pop("PYTHONSAFEPATH")
         if before is not None:
             os.environ["PYTHONSAFEPATH"] = before
+
+
+_scheduler_settings, _safe_path = _SharedContext(_setting_dask_up), _SharedContext(_setting_safe_path)
+
+
+def applying_scheduler_settings() -> AbstractContextManager[None]:
+    """Apply Dask settings for a scheduler in this process, as long as it is open.
+
+    A frozen worker is noticed within a minute. Dask does not profile its threads, which saves CPU time. The
+    link to the dashboard uses the only address on which the dashboard answers.
+    """
+    return _scheduler_settings.use()
+
+
+def starting_processes_safely() -> AbstractContextManager[None]:
+    """Let processes that Dask starts meanwhile import nothing from their working folder."""
+    return _safe_path.use()
+
+
+def safe_nanny_class() -> type:
+    """Make the class of what starts local workers, and replaces those that die, even while a bench waits."""
+    from distributed import Nanny, Status
+
+    class SafeNanny(Nanny):
+        async def instantiate(self) -> Status:
+            with starting_processes_safely():
+                return await super().instantiate()
+
+    return SafeNanny
 
 
 def load_tls_certificates() -> "Security":

@@ -57,6 +57,8 @@ class PieceRunner:
         self._work_folder.mkdir()
         self._goldens_folder = self._work_folder / "golden"
         self._golden_cache = GoldenRunCache(bundle, inputs.manifest)
+        self._digest_by_golden_folder: dict[Path, str] = {}
+        self._note_golden_digests()
         self._matching_goldens: set[str] = set()  # golden runs that equal the campaign's
         self._runners: WorkerRunners | None = None  # made for the first piece
 
@@ -87,6 +89,12 @@ class PieceRunner:
         self._runners = self._runners or self._make_runners()
         return self._runners
 
+    def _note_golden_digests(self) -> None:
+        self._digest_by_golden_folder |= {
+            path_below(self._goldens_folder, key): golden_digest
+            for key, (_, golden_digest) in self._bundle.golden_and_digest_by_key.items()
+        }
+
     def _make_runners(self) -> WorkerRunners:
         bundle = self._bundle
         return WorkerRunners(
@@ -101,10 +109,7 @@ class PieceRunner:
             golden_folder_of=lambda experiment: path_below(
                 self._goldens_folder, self._golden_of(experiment).key
             ),
-            digest_by_golden_folder={
-                path_below(self._goldens_folder, key): golden_digest
-                for key, (_, golden_digest) in bundle.golden_and_digest_by_key.items()
-            },
+            digest_by_golden_folder=self._digest_by_golden_folder,
             has_seeded_goldens=bundle.meta["several_seeds"],
             scenario_file=bundle.scenario_path,
             with_series=bundle.meta["series"],
@@ -114,6 +119,9 @@ class PieceRunner:
         """Make a golden run or copy it from the cache; WorkerGoldenRunsDiffer if it differs from the
         campaign's.
         """
+        if key not in self._bundle.golden_and_digest_by_key:
+            self._bundle = UnpackedBundle(self._bundle.folder)  # a bench has needed it since
+            self._note_golden_digests()
         golden, expected_digest = self._bundle.golden_and_digest_by_key[key]
         folder = path_below(self._goldens_folder, key)
         self._goldens_folder.mkdir(exist_ok=True)

@@ -6,22 +6,21 @@ released immediately.
 
 import asyncio
 import time
-import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from distributed import Client, Future
+from distributed import Future
 
 from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import DiskFull, MutatorError, SchedulerGone, WorkerCutOff, WorkerRefused
 from mutator.execution.cluster import worker_tasks
-from mutator.execution.cluster.bundle import Bundle
+from mutator.execution.cluster.attending_workers import AttendingWorker, AttendingWorkers
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceResult
 from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.cluster.result_intake import ResultIntake
-from mutator.execution.cluster.worker_calls import await_answer, call_on_worker, submit_to_worker
+from mutator.execution.cluster.worker_calls import await_answer, submit_to_worker
 from mutator.execution.cluster.worker_roster import WorkerRoster, describe_worker
 from mutator.execution.session import Session
 from mutator.preflight import equivalence_check
@@ -32,7 +31,6 @@ _WORKERLESS_TIMEOUT_S = 60.0  # time without any worker after which the command 
 _MOST_TASKS_PER_SLOT = 2  # pieces per thread of a worker: one waits while the other runs
 _MOST_FAILURES_IN_A_ROW = 3  # consecutive failures after which a worker gets no more work
 _IDLE_PAUSE_S = 0.1  # pause before an idle worker asks again
-_LEAVE_TIMEOUT_S = 5.0  # time for workers to drop the run
 _SCHEDULER_TIMEOUT_S = 30.0  # time for the scheduler to answer
 
 
@@ -40,39 +38,41 @@ _SCHEDULER_TIMEOUT_S = 30.0  # time for the scheduler to answer
 class _PresentWorker:
     """A present worker and its pieces, oldest first."""
 
-    name: str
-    address: str
+    attending: AttendingWorker
     slots: int
-    attendance: "Future[None] | None" = None  # the task `attend_run`
     serving_task: "asyncio.Task[None] | None" = None
     pieces_by_number: dict[int, Piece] = field(default_factory=dict)
-    was_cut_off: bool = False  # the scheduler dropped its tasks, so it must be admitted again
+    was_cut_off: bool = False  # it must be admitted again
+    was_refused: bool = False
     failures_in_a_row: int = 0  # since the worker's last finished piece
     last_failure: str = ""  # reason for the last failure
-    unstored_machine_facts: Mapping[str, Any] = field(default_factory=dict)  # empty once they are in run.json
+
+    @property
+    def name(self) -> str:
+        return self.attending.name
 
 
 class WorkDispatcher:
-    """Distributes the work of a session to the workers of a scheduler.
+    """Distributes the pending work of a session to the workers of a scheduler. Those in `attending` attend
+    the run already, and stay when all is done.
 
     `remark` is called with messages for the user. `expected_workers` is a number; None if unknown.
     """
 
     def __init__(
-        self, session: Session, client: Client, remark: Callable[[str], None], *, expected_workers: int | None
+        self,
+        session: Session,
+        attending: AttendingWorkers,
+        remark: Callable[[str], None],
+        *,
+        expected_workers: int | None,
     ) -> None:
-        self._session, self._client, self._remark, self._expected_workers = (
-            session,
-            client,
-            remark,
-            expected_workers,
-        )
+        self._session, self._attending, self._remark = session, attending, remark
+        self._client, self._expected_workers = attending.client, expected_workers
         folder = session.folder
-        self._bundle = Bundle.pack_for_run(session.workspace, folder, session.engine)
         self._queue = PieceQueue(folder, session.pending, session.proof)
         self._intake = ResultIntake(folder, session.manifest, session.unused_worker_name("cluster"))
         self._roster = WorkerRoster(folder.session_environments[-1], accept=session.accept_versions)
-        self._run_id = f"mutator-{uuid.uuid4().hex}"
         self._workers_by_key: dict[str, _PresentWorker] = {}
         self._queue_changed = asyncio.Event()  # set when idle workers might find work
         self._write_lock = asyncio.Lock()
@@ -105,24 +105,12 @@ class WorkDispatcher:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            await self._dismiss_workers()
+            # a refused worker can be fit for the next batch
+            refused = [worker.attending for worker in self._workers_by_key.values() if worker.was_refused]
+            await self._attending.dismiss(refused)
             self._session.workers_note = ""
             await asyncio.gather(*self._pending_writes, return_exceptions=True)
             self._session.written.add_report(self._intake.close())
-
-    async def _dismiss_workers(self) -> None:
-        """Tell the workers to drop the run. Workers that do not answer drop it once the client is gone."""
-        present = [worker for worker in self._workers_by_key.values() if worker.attendance is not None]
-        calls = [
-            call_on_worker(self._client, worker.address, worker_tasks.leave_run, self._run_id)
-            for worker in present
-        ]
-        with suppress(TimeoutError):
-            async with asyncio.timeout(_LEAVE_TIMEOUT_S):
-                await asyncio.gather(*calls, return_exceptions=True)
-        for worker in present:
-            if worker.attendance is not None:
-                worker.attendance.release()
 
     @property
     def _address(self) -> str:
@@ -152,7 +140,8 @@ class WorkDispatcher:
             address, worker_info = key.partition(" ")[0], info_by_key[key]
             name = str(worker_info["name"])
             name = name if name == address else f"{name} at {address}"
-            worker = _PresentWorker(name, address, int(worker_info["nthreads"]))
+            attending = self._attending.worker(key, name, address)
+            worker = _PresentWorker(attending, int(worker_info["nthreads"]))
             worker.serving_task = asyncio.create_task(self._admit_and_employ(worker))
             self._workers_by_key[key] = worker
         for worker in self._workers_by_key.values():
@@ -165,6 +154,7 @@ class WorkDispatcher:
         assert worker.serving_task is not None
         worker.serving_task.cancel()
         await asyncio.gather(worker.serving_task, return_exceptions=True)
+        self._attending.forget(worker.attending)
         for place, piece in enumerate(worker.pieces_by_number.values()):
             if place < worker.slots:
                 lost = PieceResult(
@@ -202,38 +192,22 @@ class WorkDispatcher:
 
     async def _admit_and_employ(self, worker: _PresentWorker) -> None:
         """Admit a worker, and give it work while it is present."""
-        facts: Mapping[str, Any] = {}
+        attending = worker.attending
         try:
-            facts = await call_on_worker(
-                self._client, worker.address, worker_tasks.machine_facts, tuple(self._roster.packages)
-            )
-            if why := self._roster.reason_to_refuse(facts):
-                raise WorkerRefused(why)
-            data, digest = self._bundle.data, self._bundle.digest
-            await call_on_worker(
-                self._client,
-                worker.address,
-                worker_tasks.deliver_bundle,
-                self._run_id,
-                worker.name,
-                data,
-                digest,
-            )
-            worker.attendance = submit_to_worker(
-                self._client, worker.address, worker_tasks.attend_run, self._run_id
-            )
-            self._roster.admit_worker(worker.name, facts)
+            attendance = await self._attending.ensure_attending(attending, self._session, self._roster)
+            self._roster.admit_worker(worker.name, attending.facts)
             self._queue.add_worker(worker.name, worker.slots)
-            worker.unstored_machine_facts = facts
-            await self._employ_while_attending(worker, worker.attendance)
+            await self._employ_while_attending(worker, attendance)
         except WorkerRefused as why:
             for piece in worker.pieces_by_number.values():
                 self._queue.give_back_piece(piece, worker.name)
             worker.pieces_by_number.clear()
             worker.was_cut_off = isinstance(why, WorkerCutOff)
-            if not worker.was_cut_off:
+            attending.cut_off_unneeded_pieces()
+            worker.was_refused = not worker.was_cut_off
+            if worker.was_refused:
                 self._roster.refuse_worker(worker.name, str(why))
-                self._remark(f"worker {describe_worker(worker.name, facts)} gets no work: {why}")
+                self._remark(f"worker {describe_worker(worker.name, attending.facts)} gets no work: {why}")
         finally:
             self._roster.remove_worker(worker.name)
             self._queue.forget_worker(worker.name)
@@ -265,11 +239,24 @@ class WorkDispatcher:
                 await asyncio.sleep(_IDLE_PAUSE_S)
                 continue
             worker.pieces_by_number[piece.number] = piece
-            data = await call_on_worker(
-                self._client, worker.address, worker_tasks.run_piece, self._run_id, piece.to_bytes()
-            )
+            data = await self._run_on_worker(worker.attending, piece)
             del worker.pieces_by_number[piece.number]
             await self._handle_result(worker, piece, _unpack_result(data, piece))
+
+    async def _run_on_worker(self, worker: AttendingWorker, piece: Piece) -> bytes:
+        future = submit_to_worker(
+            self._client, worker.address, worker_tasks.run_piece, self._attending.run_id, piece.to_bytes()
+        )
+        try:
+            data = await await_answer(future)
+        except asyncio.CancelledError:
+            worker.unneeded_pieces.append(future)
+            raise
+        except WorkerRefused:
+            future.release()
+            raise
+        future.release()
+        return data
 
     async def _handle_result(self, worker: _PresentWorker, piece: Piece, result: PieceResult) -> None:
         if result.ending is PieceEnding.FINISHED:
@@ -288,13 +275,11 @@ class WorkDispatcher:
             raise WorkerRefused(result.reason)
 
     async def _store_result(self, piece: Piece, worker: _PresentWorker, result: PieceResult) -> None:
-        if (
-            worker.unstored_machine_facts
-        ):  # before its first results are written, run.json must name the worker
-            self._session.note_machine(
-                typed_value_from_json(WorkerMachine, {"worker": worker.name, **worker.unstored_machine_facts})
-            )
-            worker.unstored_machine_facts = {}
+        if not worker.attending.is_machine_stored:
+            # before its first results are written, run.json must name the worker
+            facts = {"worker": worker.name, **worker.attending.facts}
+            self._session.note_machine(typed_value_from_json(WorkerMachine, facts))
+            worker.attending.is_machine_stored = True
         for (
             other
         ) in self._workers_by_key.values():  # the piece ran here, so it did not cause the failures elsewhere

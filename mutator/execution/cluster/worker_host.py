@@ -120,6 +120,10 @@ class WorkerHost:
             raise
         return cls(folder, worker_name, patience_s)
 
+    def add_growth(self, data: bytes) -> None:
+        """Add golden runs and scenarios that a bench has needed since; MutatorError for a damaged parcel."""
+        bundle.unpack_growth(data, self.folder)
+
     def start_processes_on_request(self, is_wanted: PieceNeededCheck) -> None:
         """Start processes on request until the host is no longer wanted, then end all of them."""
         try:

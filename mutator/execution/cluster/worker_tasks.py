@@ -42,14 +42,26 @@ def machine_facts(packages: Iterable[str]) -> dict[str, Any]:
 
 
 def deliver_bundle(run: str, worker_name: str, bundle: bytes, digest: str) -> None:
-    if sha256(bundle).hexdigest() != digest:
-        raise MutatorError(
-            "the bundle that arrived differs from the one that was sent", remedy="check the network"
-        )
+    _check_digest(bundle, digest)
     host = WorkerHost.unpack_in(bundle, get_worker().local_directory, worker_name)
     with _bundle_arrived:
         _hosts_by_run[run] = host
         _bundle_arrived.notify_all()
+
+
+def deliver_growth(run: str, growth: bytes, digest: str) -> None:
+    """Add what the plan of a bench has needed since the bundle was packed."""
+    _check_digest(growth, digest)
+    if (host := _hosts_by_run.get(run)) is None:
+        raise MutatorError("this worker has left the run", remedy="deliver the bundle again")
+    host.add_growth(growth)
+
+
+def _check_digest(data: bytes, digest: str) -> None:
+    if sha256(data).hexdigest() != digest:
+        raise MutatorError(
+            "the bundle that arrived differs from the one that was sent", remedy="check the network"
+        )
 
 
 def attend_run(run: str) -> None:

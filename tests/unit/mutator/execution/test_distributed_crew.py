@@ -117,3 +117,23 @@ def test_a_stopped_crew_accepts_no_more(
     crew.stop()
     with pytest.raises(MutatorError, match="the bench was closed"):
         crew.hand_out(batch_of(experiment()))
+
+
+def test_a_distributor_that_can_stay_is_open_until_the_crew_ends(
+    monkeypatch: pytest.MonkeyPatch, experiment: Callable[..., Experiment]
+) -> None:
+    """It is told to stay, and is closed with the crew, and when the crew is killed after a problem; new
+    limits do not close it."""
+    calls: list[str] = []
+    names = ("stay_open", "run", "close")
+    acts = {name: lambda *arguments, name=name: calls.append(name) for name in names}
+    session = crew_with(monkeypatch)[1]
+    crew = DistributedCrew(SimpleNamespace(**acts), 1, lambda: session, lambda record: None)  # type: ignore[arg-type, return-value]
+    crew.hand_out(batch_of(experiment()))
+    with pytest.raises(MutatorError, match="no result"):
+        crew.receive()
+    crew.use_new_limits()
+    assert calls == ["stay_open", "run"]
+    crew.kill()
+    crew.close()
+    assert calls == ["stay_open", "run", "close", "close"]

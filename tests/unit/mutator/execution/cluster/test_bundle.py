@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, UnsafePath
 from mutator.execution.cluster import bundle
-from mutator.execution.cluster.bundle import Bundle, load_run_inputs, unpack_bundle
+from mutator.execution.cluster.bundle import Bundle, load_run_inputs, unpack_bundle, unpack_growth
 from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.session_opening import open_session
@@ -55,6 +55,30 @@ def test_a_worker_has_the_limits_of_the_run(
     unpack_bundle(Bundle.pack_for_run(workspace, folder, "reference").data, tmp_path / "worker")
     assert UnpackedBundle(tmp_path / "worker").limits == folder.limits
     assert isinstance(folder.limits, MeasuredLimits) == bool(measured)
+
+
+def test_growth_brings_golden_runs_and_scenarios_and_nothing_else(prepared: Prepared, tmp_path: Path) -> None:
+    """A bundle that has grown has the bytes of one packed now; what is not part of growth is refused, and a
+    link that a mutant put in the way is not followed.
+    """
+    workspace, folder = prepared
+    site, whole = tmp_path / "site", Bundle.pack_for_run(workspace, folder, "reference")
+    unpack_bundle(whole.data, site)
+    shutil.rmtree(site / "scenarios")
+    (site / "meta.json").write_text("{}")
+    growth = Bundle.pack_growth(workspace, folder, "reference")
+    unpack_growth(growth.data, site)
+    parts = unpack_parcel(growth.data)
+    assert {*parts} == {"meta.json", "scenarios/A.yaml"}
+    for name, content in unpack_parcel(whole.data).items():
+        assert (site / name).read_bytes() == content
+    with pytest.raises(UnsafePath, match=r"templates/offset\.j2"):
+        unpack_growth(pack_parcel(parts | {"templates/offset.j2": b""}), site)
+    shutil.rmtree(site / "scenarios")
+    (site / "scenarios").symlink_to(tmp_path)
+    with pytest.raises(UnsafePath):
+        unpack_growth(growth.data, site)
+    assert not (tmp_path / "A.yaml").exists()
 
 
 def with_argument(workspace: Workspace, text: str) -> None:

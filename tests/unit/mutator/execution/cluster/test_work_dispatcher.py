@@ -7,6 +7,8 @@ import time
 import warnings
 from collections.abc import Callable, Generator, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,8 +20,9 @@ from mutator.campaigns.chunks import pending_chunks_of
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.campaigns.run_provenance import append_session_environment
-from mutator.errors import MutatorWarning
+from mutator.errors import MutatorError, MutatorWarning
 from mutator.execution.cluster import cluster_distributor
+from mutator.execution.cluster.attending_workers import AttendingWorkers
 from mutator.execution.cluster.bundle import Bundle
 from mutator.execution.cluster.cluster_distributor import ClusterDistributor
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceResult
@@ -75,7 +78,10 @@ class Answer:
         self.future = future
 
     def __await__(self) -> Generator[Any, None, Any]:
-        return self.future.__await__()
+        return asyncio.shield(self.future).__await__()  # who no longer waits does not end the task
+
+    def done(self) -> bool:
+        return self.future.done()
 
     def release(self) -> None:
         self.future.cancel()
@@ -91,7 +97,8 @@ class Workers:
         self.seconds: dict[str, float] = {}  # how long each worker takes for a piece
         self.began: list[str] = []  # the worker of each piece that began
         self.cut_at = -1  # once this many pieces have begun, the scheduler forgets this client's tasks
-        self._open: list[asyncio.Future[Any]] = []
+        self.calls: list[str] = []  # what came before and after the pieces, with its worker
+        self._open: list[tuple[str, asyncio.Future[Any]]] = []
 
     async def identity(self, n_workers: int) -> dict[str, Any]:
         told = {name: {"id": name, "name": name, "nthreads": 1} for name in self.workers}
@@ -101,20 +108,26 @@ class Workers:
         self, function: Callable[..., Any], *given: Any, workers: Sequence[str], **more: Any
     ) -> Answer:
         future = asyncio.get_running_loop().create_future()
-        self._open.append(future)
+        self._open.append((function.__name__, future))
+        name = workers[0].removeprefix("tcp://")
+        if function.__name__ in ("deliver_bundle", "deliver_growth", "leave_run"):
+            self.calls.append(f"{function.__name__} {name}")
         if function.__name__ == "run_piece":
-            name = workers[0].removeprefix("tcp://")
             self.began.append(name)
             asyncio.get_running_loop().call_later(
                 self.seconds.get(name, 0.02), self._end, future, name, given[1]
             )
             if len(self.began) == self.cut_at:
-                for one in self._open:
-                    if not one.done():
-                        one.set_exception(FutureCancelledError("some", "lost"))
+                self.drop_tasks()
         elif function.__name__ != "attend_run":
             future.set_result(FACTS if function.__name__ == "machine_facts" else None)
         return Answer(future)
+
+    def drop_tasks(self, function_name: str = "") -> None:
+        """Forget the tasks of a function, or of all."""
+        for name, future in self._open:
+            if not future.done() and function_name in ("", name):
+                future.set_exception(FutureCancelledError("some", "lost"))
 
     def _end(self, future: "asyncio.Future[Any]", name: str, piece: bytes) -> None:
         if not future.done():
@@ -131,6 +144,7 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
     """A session in which every experiment is pending, and the versions of workers are not checked."""
     monkeypatch.setattr(Bundle, "pack_for_run", lambda *given: Bundle(b"", ""))
     monkeypatch.setattr(WorkerRoster, "reason_to_refuse", lambda *given: "")
+    numbers = count()
     folder = append_session_environment(folder, SessionEnvironment(python="", packages={}, platform=""))
     return SimpleNamespace(
         workspace=toycar,
@@ -140,7 +154,7 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
         proof=(),
         engine="fork",
         accept_versions=True,
-        unused_worker_name=lambda name: f"0001-{name}",
+        unused_worker_name=lambda name: f"0001-{name}{next(numbers)}",
         written=WrittenFiles(),
         note_machine=lambda machine: None,
         problem="",
@@ -155,7 +169,9 @@ def dealt(session: Any, workers: Workers, queued: int | None = None) -> tuple[di
     async def deal() -> None:
         client: Any = workers
         async with asyncio.timeout(20.0):
-            await WorkDispatcher(session, client, remarks.append, expected_workers=queued).run()
+            await WorkDispatcher(
+                session, AttendingWorkers(client), remarks.append, expected_workers=queued
+            ).run()
 
     run(deal())
     return dict(session.folder.records()), remarks
@@ -200,6 +216,72 @@ def test_work_is_submitted_again_after_a_lost_connection(session: Any) -> None:
     assert (len(records), errors(records), session.problem, remarks) == (12, [], "", [])
 
 
+def test_workers_stay_for_the_next_session(session: Any) -> None:
+    """A worker gets the bundle once; one that has come since, or whose tasks the scheduler has dropped, is
+    admitted. A refused one is asked again, because it can be fit then. All are dismissed at the end.
+    """
+    workers = Workers(alpha=healthy, odd=sick(PieceEnding.GOLDEN_DIFFERS))
+    workers.seconds["alpha"] = 0.1  # so that the other gets a piece, too
+    client: Any = workers
+    pending, calls_by_session = session.pending, []
+
+    async def distribute_all() -> None:
+        attending = AttendingWorkers(client)
+        for changes in ({}, {"odd": healthy}, {"beta": healthy}, {}):
+            workers.workers |= changes
+            session.pending = pending
+            await WorkDispatcher(session, attending, lambda remark: None, expected_workers=None).run()
+            calls_by_session.append(sorted(workers.calls))
+            workers.calls.clear()
+            if "beta" in changes:
+                workers.drop_tasks("attend_run")
+        await attending.dismiss()
+        calls_by_session.append(sorted(workers.calls))
+
+    run(distribute_all())
+    admitted = [
+        ["deliver_bundle alpha", "deliver_bundle odd"],
+        ["deliver_bundle odd"],
+        ["deliver_bundle beta"],
+    ]
+    readmitted = ["deliver_bundle alpha", "deliver_bundle beta", "deliver_bundle odd"]
+    dismissed = ["leave_run alpha", "leave_run beta", "leave_run odd"]
+    assert calls_by_session == [[*admitted[0], "leave_run odd"], *admitted[1:], readmitted, dismissed]
+
+
+def test_a_worker_is_told_what_a_bench_has_needed_since(
+    session: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """New golden runs are delivered to the workers that attend; new limits need new processes."""
+    monkeypatch.setattr(Bundle, "pack_growth", lambda *arguments: Bundle(b"", ""))
+    client: Any = (workers := Workers(alpha=healthy))
+    pending, calls_by_session = session.pending, []
+    golden_runs, limits = session.folder.golden_runs, session.folder.limits
+
+    async def distribute_all() -> None:
+        attending = AttendingWorkers(client)
+        for runs, wall_s in (
+            ((), 100),
+            (golden_runs, 100),
+            (golden_runs, 100),
+            (golden_runs, 200),
+        ):
+            vars(session.folder)["golden_runs"] = runs
+            monkeypatch.setattr(RunFolder, "limits", replace(limits, wall_s=wall_s))
+            session.pending = pending
+            await WorkDispatcher(session, attending, lambda remark: None, expected_workers=None).run()
+            calls_by_session.append([*workers.calls])
+            workers.calls.clear()
+
+    run(distribute_all())
+    assert calls_by_session == [
+        ["deliver_bundle alpha"],
+        ["deliver_growth alpha"],
+        [],
+        ["leave_run alpha", "deliver_bundle alpha"],
+    ]
+
+
 def test_work_waits_for_a_queued_worker_after_a_refusal(session: Any) -> None:
     workers = Workers(odd=sick(PieceEnding.GOLDEN_DIFFERS))
 
@@ -211,7 +293,10 @@ def test_work_waits_for_a_queued_worker_after_a_refusal(session: Any) -> None:
         client: Any = workers
         async with asyncio.timeout(20.0), asyncio.TaskGroup() as group:
             group.create_task(late())
-            group.create_task(WorkDispatcher(session, client, lambda remark: None, expected_workers=2).run())
+            dispatcher = WorkDispatcher(
+                session, AttendingWorkers(client), lambda remark: None, expected_workers=2
+            )
+            group.create_task(dispatcher.run())
 
     run(deal())
     assert (len(session.folder.records()), session.problem) == (12, "")
@@ -267,3 +352,58 @@ def test_an_error_in_a_remark_ends_the_work(session: Any, monkeypatch: pytest.Mo
         with pytest.raises(MutatorWarning, match="something"):
             ClusterDistributor(Place()).run(session)
     assert not [one for one in threading.enumerate() if one.name == "cluster" and one.is_alive()]
+
+
+class CountedPlace:
+    """A cluster that counts how often it was opened and closed."""
+
+    def __init__(self) -> None:
+        self.opened, self.closed = 0, 0
+
+    @asynccontextmanager
+    async def open(self, *, insecure: bool):  # type: ignore[no-untyped-def]
+        self.opened += 1
+        try:
+            yield None
+        finally:
+            self.closed += 1
+
+
+def test_a_cluster_stays_open_until_it_is_closed(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By default it is opened for each session; kept open, it is closed by a problem, an error, or at the
+    end. The next session opens another.
+    """
+    ends: list[Any] = []
+
+    class Ending:
+        def __init__(self, *arguments: Any, **more: Any) -> None:
+            pass
+
+        async def run(self) -> None:
+            end = ends.pop() if ends else ""
+            if isinstance(end, Exception):
+                raise end
+            session.problem = end
+
+    monkeypatch.setattr(cluster_distributor, "WorkDispatcher", Ending)
+    place = CountedPlace()
+    distributor = ClusterDistributor(place)
+    for number in (1, 2):
+        distributor.run(session)
+        assert (place.opened, place.closed) == (number, number)
+    distributor.stay_open()
+    for _ in range(3):
+        distributor.run(session)
+        assert (place.opened, place.closed) == (3, 2)
+    ends.append("the scheduler is gone")
+    distributor.run(session)
+    assert (place.opened, place.closed) == (3, 3)
+    distributor.run(session)
+    ends.append(MutatorError("wrong"))
+    with pytest.raises(MutatorError, match="wrong"):
+        distributor.run(session)
+    assert (place.opened, place.closed) == (4, 4)
+    distributor.run(session)
+    for _ in range(2):
+        distributor.close()
+    assert (place.opened, place.closed) == (5, 5)
