@@ -18,6 +18,7 @@ from mutator.store import file_digests, plan_file
 from mutator.store.checks_file import CHECKS_FILE as CHECKS
 from mutator.store.checks_file import CHECKS_SCHEMA
 from mutator.store.plan_lines import read_plan_lines
+from mutator.store.planned_scenarios import planned_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.targets.manifest import TargetManifest
@@ -86,11 +87,12 @@ def check_result_problems(folder: RunFolder) -> Problems:
         return
     stored = read_json(path, CHECKS_SCHEMA)
     check_names = {result["name"] for result in stored["results"]}
-    keys = [golden_run.key for golden_run in folder.golden_runs]
+    keys, planned = [golden_run.key for golden_run in folder.golden_runs], planned_scenarios_of(folder.path)
     expected_names = [
         "anchors",
         *(["canary"] if folder.head.canary else []),
-        *(f"{kind} {key}" for key in keys for kind in ("golden", "null mutant")),
+        *(f"{kind} {run.key}" for run in folder.listed_goldens for kind in ("golden", "null mutant")),
+        *(f"family {name}" for name in (planned.families if planned else ())),
     ]
     if missing := [name for name in expected_names if name not in check_names]:
         yield MutatorError(f"no check `{missing[0]}`", where=path, expected="the checks of all golden runs")

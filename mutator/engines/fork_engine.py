@@ -328,14 +328,7 @@ class ForkEngine:
             return stored
         folder = self._runs_folder / f"watch-{golden_id}"
         try:
-            swap = self._plan_swap(job, self._null_mutant.files, self._null_mutant.probe_source)
-            null = replace(job, mutant_id=None, stop_at_hazard=False)
-            self._process_before_step(job, 0, swap)  # NotForkable, with the reason, if the run cannot begin
-            # Fork before the first step, because a later fork misses earlier observations.
-            first = self._ensure_server(job).first_process
-            execution = self._run_in_fork(first, null, folder, swap, _BEFORE_FIRST_STEP, observe=True)
-            if execution.status is Status.HARNESS_ERROR:
-                raise ForkServerLost(execution.detail)
+            execution = self.drive_fault_free(job, folder)
             if execution.status is not Status.OK:
                 raise NotForkable(f"its golden run ended as {execution.status.value}: {execution.detail}")
             for name in self._manifest.output_files:
@@ -346,10 +339,29 @@ class ForkEngine:
                 raise NotForkable("it observes before its first step")
             self._observation_store.save(golden_id, observations)
             return observations
-        except MutantNotSwappable as why:
-            raise NotForkable(f"its observing statement cannot be inserted: {why}") from None
         finally:
             remove_folder(folder)
+
+    def drive_fault_free(self, job: Job, folder: Path) -> JobResult:
+        """Drive a golden run in a fork of the loaded target, with a probe that observes it.
+
+        `folder` is a new scratch folder; the output is in that of the reference engine. NotForkable if the
+        target or this run cannot be forked.
+        """
+        if self._obstacle:
+            raise NotForkable(*self._obstacle.args)
+        try:
+            swap = self._plan_swap(job, self._null_mutant.files, self._null_mutant.probe_source)
+        except MutantNotSwappable as why:
+            raise NotForkable(f"its observing statement cannot be inserted: {why}") from None
+        null = replace(job, mutant_id=None, stop_at_hazard=False)
+        self._process_before_step(job, 0, swap)  # NotForkable, with the reason, if the run cannot begin
+        # Fork before the first step, because a later fork misses earlier observations.
+        first = self._ensure_server(job).first_process
+        execution = self._run_in_fork(first, null, folder, swap, _BEFORE_FIRST_STEP, observe=True)
+        if execution.status is Status.HARNESS_ERROR:
+            raise ForkServerLost(execution.detail)
+        return execution
 
 
 _BEFORE_FIRST_STEP = ForkPoint(step=0, observation_count=0, earliest_time_s=None, last_time_s=None)

@@ -108,7 +108,13 @@ class Session:
         self._ledger_at_start: file_digests.DigestLedger | None = None  # as it was when the work began
         self._head_at_start = b""
         self.workers_note = ""  # the present workers, if known
-        self.checks = SessionChecks(workspace, workers=workers, secret=self.secret, notify=notify)
+        self.checks = SessionChecks(
+            workspace,
+            workers=workers,
+            secret=self.secret,
+            with_forks=self.engine != REFERENCE,
+            notify=notify,
+        )
         self._start_s = time.monotonic()
         self._finished_count_before = 0
         self._records: Mapping[str, Record] | None = None

@@ -30,9 +30,16 @@ class SessionChecks:
     """
 
     def __init__(
-        self, workspace: Workspace, *, workers: int, secret: bytes, notify: ProgressCallback
+        self,
+        workspace: Workspace,
+        *,
+        workers: int,
+        secret: bytes,
+        with_forks: bool,
+        notify: ProgressCallback,
     ) -> None:
         self._workspace, self._workers, self._secret, self._notify = workspace, workers, secret, notify
+        self._with_forks = with_forks
         self.beside: ChecksBesideExperiments | None = None
         self._passed: dict[str, CheckRun] = {}
         self.were_abandoned = False
@@ -44,11 +51,21 @@ class SessionChecks:
         with self._naming_golden_run_pages(folder):
             if beside_experiments and self._workers:
                 self.beside = begin_checks(
-                    self._workspace, folder, workers=self._workers, notify=self._notify, secret=self._secret
+                    self._workspace,
+                    folder,
+                    workers=self._workers,
+                    notify=self._notify,
+                    secret=self._secret,
+                    with_forks=self._with_forks,
                 )
             else:
                 run_checks(
-                    self._workspace, folder, workers=self._workers, notify=self._notify, secret=self._secret
+                    self._workspace,
+                    folder,
+                    workers=self._workers,
+                    notify=self._notify,
+                    secret=self._secret,
+                    with_forks=self._with_forks,
                 )
         if not self.beside:
             self._warn_of_unreached_triggers(folder)

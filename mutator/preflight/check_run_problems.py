@@ -86,6 +86,15 @@ def null_mutant_problem(first: CheckRun, null: CheckRun) -> str:
     return "" if null.has_triggered else "its trigger never fired: the observation statement is not executed"
 
 
+def forked_run_problem(first: CheckRun, forked: CheckRun) -> str:
+    """Return the problem of a golden run in a fork of the loaded target; empty if there is none."""
+    if forked.problem:
+        return forked.problem
+    if forked.output_digest != first.output_digest:
+        return "a fork of the loaded target gives other bytes than a fresh process"
+    return ""
+
+
 def equal_scenarios_problem(goldens: Mapping[str, CheckRun]) -> str:
     """Return the problem of golden runs (by scenario) that are equal according to the manifest; empty if
     there is none.

@@ -16,6 +16,7 @@ from mutator.preflight.canary_check import CanaryVerdict
 from mutator.preflight.check_run_problems import CheckRun
 from mutator.preflight.preflight_check_runner import (
     CANARY,
+    FORKED,
     GOLDEN,
     NULL_MUTANT,
     CheckRunByName,
@@ -33,18 +34,26 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import StagePace
 from mutator.workspace import Workspace
 
+_ORDER = (NULL_MUTANT, GOLDEN, FORKED)  # of the runs of a golden run
+
 
 def begin_checks(
-    workspace: Workspace, folder: RunFolder, *, workers: int, notify: OnProgress, secret: bytes
+    workspace: Workspace,
+    folder: RunFolder,
+    *,
+    workers: int,
+    notify: OnProgress,
+    secret: bytes,
+    with_forks: bool = False,
 ) -> "ChecksBesideExperiments | None":
     """Begin the checks of a run folder; the parameters are those of `run_checks`.
 
     None if there are none left: they had passed before, or limits of faulty runs follow from all golden runs,
     so that all had to run first. CheckFailed if one fails now.
     """
-    checks = PreflightChecks(workspace, folder, secret)
+    checks = PreflightChecks(workspace, folder, secret, with_forks=with_forks)
     if "cpu_s" in checks.campaign.measured_limit_names:
-        run_checks(workspace, folder, workers=workers, notify=notify, secret=secret)
+        run_checks(workspace, folder, workers=workers, notify=notify, secret=secret, with_forks=with_forks)
         return None
     if checks.find_earlier_results(workers, notify) is not None:
         return None
@@ -115,7 +124,7 @@ class ChecksBesideExperiments:
                 self.has_failed |= bool(result and result.problem)
                 continue
             self._runs[name] = result
-            if {(GOLDEN, name[1]), (NULL_MUTANT, name[1])} <= self._runs.keys():
+            if self._runner.runs_needed_of(name[1]) <= self._runs.keys():
                 if self._is_sound(name[1]):
                     run = passed[name[1].key] = self._runs[GOLDEN, name[1]]
                     self._place(name[1], run.output_digest)
@@ -159,10 +168,9 @@ class ChecksBesideExperiments:
         self._open.close()
 
     def _names_in_order(self) -> Iterator[tuple[str, Any]]:
-        """Yield the two runs of each golden run in turn, and the canary after the first."""
+        """Yield the runs of each golden run in turn, and the canary after the first."""
         for number, key in enumerate(self._runner.golden_runs):
-            yield NULL_MUTANT, key
-            yield GOLDEN, key
+            yield from sorted(self._runner.runs_needed_of(key), key=lambda name: _ORDER.index(name[0]))
             if number == 0:
                 yield CANARY, None
 

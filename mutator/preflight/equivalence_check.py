@@ -102,7 +102,8 @@ def mark_check_as_needed(run: Path) -> None:
 
 
 def choose_sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:
-    """Choose one experiment in a hundred, at least 20, with every fault type and every scenario.
+    """Choose one experiment in a hundred, at least 20, with every fault type, and every scenario or
+    family.
 
     Of fewer than 40 experiments, draw one in ten, at least three: 20 would be most of them. Each is equally
     likely, so that the sample can say what it excludes.
@@ -143,7 +144,7 @@ def sample_of_bench(experiments: Iterable[Experiment], seed: int) -> BenchSample
     """Return the sample of a bench. Whoever is in it stays in it when the bench grows.
 
     A hash of seed and id draws one in ten of the first 200 experiments, and one in a hundred of the others.
-    The first three are chosen, and the first of each fault type and scenario.
+    The first three are chosen, and the first of each fault type, and of each scenario or family.
     """
     drawn, chosen, covered = set[str](), set[str](), set[tuple[str, ...]]()
     for position, experiment in enumerate(experiments):
@@ -182,7 +183,7 @@ def _cached_sample_ids(run: Path, plan: str, seed_count: int) -> tuple[str, ...]
 
 def _traits_to_cover(experiment: Experiment) -> Iterator[tuple[str, ...]]:
     yield (experiment.fault.module, experiment.fault.fault_type)
-    yield (experiment.scenario,)
+    yield (experiment.concrete.family if experiment.concrete else experiment.scenario,)
 
 
 def reason_check_not_needed(folder: RunFolder) -> str | None:

@@ -22,10 +22,12 @@ from mutator.engines.golden_run_keys import golden_run_id
 from mutator.engines.observation_store import ObservationStore, observations_of_watched_run
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import measure_limits
+from mutator.errors import ForkServerLost, NotForkable
 from mutator.model import Experiment, Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.preflight import canary_check, unreached_triggers
 from mutator.preflight.check_run_problems import CheckRun, null_mutant_problem, read_check_run
+from mutator.preflight.forked_golden_runs import ForkedGoldenRuns, runs_driven_once
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.run_progress import Progress, StagePace
 from mutator.targets.manifest import TargetManifest
@@ -33,6 +35,7 @@ from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 GOLDEN, GOLDEN_AGAIN, NULL_MUTANT, CANARY = "golden", "golden again", "null mutant", "canary"
+FORKED = "forked"  # a golden run of a family, in a fork of the loaded target
 _OTHER_HASH_SEED = 4242  # any but 0, with which golden runs are made: the order of sets of strings differs
 
 OnProgress = Callable[[Progress], None]
@@ -54,6 +57,7 @@ class CheckRunner:
     observation_store: ObservationStore | None = (
         None  # from which fork engines take what null mutants observe
     )
+    with_forks: bool = False  # whether most golden runs of families are driven once, in a fork
 
     def run_all(
         self, workers: int, notify: OnProgress
@@ -67,7 +71,7 @@ class CheckRunner:
             # last, because it waits for the golden runs, which have then begun
             judged = pool.submit(self._judge_canary_after_goldens, engine, futures)
             nulls = [future for name, future in futures.items() if name[0] == NULL_MUTANT]
-            goldens = [future for name, future in futures.items() if name[0] == GOLDEN]
+            goldens = [future for name, future in futures.items() if name[0] in (GOLDEN, FORKED)]
             _report_progress("checks", [judged, *nulls], notify)
             _report_progress("golden", goldens, notify)
             runs = {name: future.result() for name, future in futures.items()}
@@ -77,7 +81,11 @@ class CheckRunner:
 
     def repeat_goldens(self, workers: int, notify: OnProgress) -> dict[str, str]:
         """Do each golden run once, as null mutant; return the digests of what they write, by key."""
-        jobs = {name: job for name, job in self.jobs_by_name().items() if name[0] == NULL_MUTANT}
+        jobs = {
+            name: job
+            for name, job in self.jobs_by_name().items()
+            if name[0] == (FORKED if name[1] in self.driven_once else NULL_MUTANT)
+        }
         with self.engine_and_pool(workers) as (engine, pool):
             futures = {
                 name[1].key: pool.submit(self.run_job, engine, name, job) for name, job in jobs.items()
@@ -89,6 +97,9 @@ class CheckRunner:
         """Return the runs that stand for the repeated golden run and the null mutant: the one that there is
         or, if it is not sound, two that tell causes apart.
         """
+        if key in self.driven_once:
+            once = runs[FORKED, key]
+            return {(GOLDEN, key): once, (GOLDEN_AGAIN, key): once, (NULL_MUTANT, key): once}
         first, null = runs[GOLDEN, key], runs[NULL_MUTANT, key]
         if first.problem or not null_mutant_problem(first, null):
             return {(GOLDEN_AGAIN, key): null}
@@ -112,6 +123,8 @@ class CheckRunner:
             yield ReferenceEngine(self.manifest, work, self.campaign.golden_run_limits), pool
         finally:
             pool.shutdown(cancel_futures=True)
+            if self.forked_golden_runs:
+                self.forked_golden_runs.close()
             remove_folder(work)
 
     def measure_limits(self, golden_runs: Iterable[CheckRun]) -> Limits:
@@ -149,10 +162,33 @@ class CheckRunner:
 
     def jobs_by_name(self) -> dict[tuple[str, Any], Job]:
         # null mutants first: their stage is reported before that of the golden runs
-        nulls = {(NULL_MUTANT, key): self._null_job(key) for key in self.golden_runs}
-        return nulls | {
-            (GOLDEN, key): Job(name=f"a-{key.key}", **self._common_of_jobs(key)) for key in self.golden_runs
+        twice = [key for key in self.golden_runs if key not in self.driven_once]
+        nulls = {(NULL_MUTANT, key): self._null_job(key) for key in twice}
+        goldens = {(GOLDEN, key): Job(name=f"a-{key.key}", **self._common_of_jobs(key)) for key in twice}
+        forked = {
+            (FORKED, key): replace(self._null_job(key), name=f"f-{key.key}", hash_seed=0)
+            for key in self.golden_runs
+            if self.forked_golden_runs and self._is_of_family(key)
         }
+        return nulls | goldens | forked
+
+    @cached_property
+    def driven_once(self) -> frozenset[GoldenRun]:
+        """The golden runs that are driven in a fork only."""
+        if not self.forked_golden_runs:
+            return frozenset()
+        return runs_driven_once(self.golden_runs, self.workspace.planned_scenarios, self.seed)
+
+    def _is_of_family(self, key: GoldenRun) -> bool:
+        planned = self.workspace.planned_scenarios
+        return planned is not None and key.scenario in planned.by_name
+
+    def runs_needed_of(self, key: GoldenRun) -> frozenset[tuple[str, Any]]:
+        """Return the runs that must end before a golden run can be judged."""
+        kinds = [FORKED] if key in self.driven_once else [GOLDEN, NULL_MUTANT]
+        if self.forked_golden_runs and self._is_of_family(key):
+            kinds.append(FORKED)
+        return frozenset((kind, key) for kind in kinds)
 
     def _null_job(self, key: GoldenRun) -> Job:
         return Job(
@@ -174,10 +210,21 @@ class CheckRunner:
         }
 
     @cached_property
+    def forked_golden_runs(self) -> ForkedGoldenRuns | None:
+        """What drives golden runs of families; None if the reference engine drives all."""
+        if not self.with_forks or not self.workspace.planned_scenarios or not self.manifest.stepwise_function:
+            return None
+        return ForkedGoldenRuns.of_target(
+            self.manifest, self.scratch_folder / "checks", self.campaign.golden_run_limits, self._null_mutant
+        )
+
+    @cached_property
     def _null_mutant(self) -> Mutant:
         return build(self.manifest, self.workspace.fault_models(), None, always_trigger())
 
     def run_job(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
+        if name[0] == FORKED:
+            return self._run_forked(name[1], job)
         scratch = path_below(engine.work_folder, job.name)
         try:
             execution = engine.execute(job, scratch)
@@ -194,6 +241,24 @@ class CheckRunner:
         finally:
             remove_folder(scratch)
 
+    def _run_forked(self, key: GoldenRun, job: Job) -> CheckRun:
+        assert self.forked_golden_runs
+        try:
+            forks, execution = self.forked_golden_runs.drive(job)
+        except (NotForkable, ForkServerLost) as why:
+            return CheckRun(problem=f"cannot be forked: {why}")
+        try:
+            run = read_check_run(self.manifest, execution)
+            if key in self.driven_once:
+                self._keep_observations(key, job, execution)
+                if not run.problem:
+                    golden_folder = path_below(self.pending_folder / "golden", key.key)
+                    golden_folder.parent.mkdir(parents=True, exist_ok=True)
+                    execution.out.rename(golden_folder)
+            return run
+        finally:
+            remove_folder(forks.reference.folder_of_job(job))
+
     def _keep_observations(self, key: GoldenRun, job: Job, execution: JobResult) -> None:
         unreached_triggers.save_observations(
             self.pending_folder, key.key, execution.watch_report.get("seen", ())
@@ -201,7 +266,7 @@ class CheckRunner:
         if self.observation_store and job.drive_step_by_step and execution.status is Status.OK:
             observations = observations_of_watched_run(execution)
             # a worker's fork engine finds and says why it cannot fork such a run
-            if not (observations.has_any_before_first_step or execution.watch_report["threads"]):
+            if not (observations.has_any_before_first_step or execution.watch_report.get("threads")):
                 self.observation_store.save(golden_run_id(job), observations)
 
 

@@ -26,11 +26,14 @@ from mutator.preflight.canary_check import CanaryVerdict
 from mutator.preflight.check_run_problems import (
     CheckRun,
     equal_scenarios_problem,
+    forked_run_problem,
     golden_pair_problem,
     null_mutant_problem,
     output_digest_of,
 )
+from mutator.preflight.forked_golden_runs import describe_family_runs
 from mutator.preflight.preflight_check_runner import (
+    FORKED,
     GOLDEN,
     GOLDEN_AGAIN,
     NULL_MUTANT,
@@ -62,15 +65,17 @@ def run_checks(
     workers: int = 1,
     notify: OnProgress | None = None,
     secret: bytes = b"",
+    with_forks: bool = False,
 ) -> tuple[CheckResult, ...]:
     """Run the checks, and store the results in checks.json and the golden runs in the folder.
 
     Nothing runs if the checks have passed for these sources in this folder. If they have passed in another
     folder on this machine, only the null mutants run, whose output must be that of the golden runs, because a
     mutant can write to the cache. Fork engines with the same `secret` take from the null mutants what these
-    observe. Raises CheckFailed if any check fails, after all have run.
+    observe. `with_forks`: drive most golden runs of families once, in a fork. Raises CheckFailed if any check
+    fails, after all have run.
     """
-    checks = PreflightChecks(workspace, folder, secret)
+    checks = PreflightChecks(workspace, folder, secret, with_forks=with_forks)
     notify = notify or (lambda progress: None)
     earlier_results = checks.find_earlier_results(workers, notify)
     if earlier_results is not None:
@@ -119,7 +124,9 @@ def _pending_folder(folder: RunFolder) -> Path:
 
 
 class PreflightChecks:
-    def __init__(self, workspace: Workspace, folder: RunFolder, secret: bytes) -> None:
+    def __init__(
+        self, workspace: Workspace, folder: RunFolder, secret: bytes, *, with_forks: bool = False
+    ) -> None:
         head = folder.head
         self.observation_store = ObservationStore(folder.scratch_folder, secret) if secret else None
         self.workspace = workspace.with_scenarios_of(folder.path)
@@ -143,7 +150,8 @@ class PreflightChecks:
             head.canary_hazard,
             _limits_that_checks_depend_on(self.campaign),
         ]
-        self.digest = digest([*content, places])
+        self._with_forks = with_forks and self.workspace.planned_scenarios is not None
+        self.digest = digest([*content, places, *(["with forks"] if self._with_forks else [])])
 
     def find_earlier_results(self, workers: int, notify: OnProgress) -> tuple[CheckResult, ...] | None:
         """Earlier results, copied from another folder if necessary; None unless all checks passed and the
@@ -265,6 +273,7 @@ class PreflightChecks:
             scratch_folder=self.folder.scratch_folder,
             pending_folder=pending_folder,
             observation_store=self.observation_store,
+            with_forks=self._with_forks,
         )
 
     def _store_in_run_folder(self, results: Mapping[str, Any]) -> None:
@@ -307,8 +316,19 @@ class PreflightChecks:
             )
 
     def _judge_goldens(self, runs: CheckRunByName) -> Iterator[CheckResult]:
+        planned = self.workspace.planned_scenarios
+        once = self.build_check_runner(self.pending_folder).driven_once
+        runs_by_family: dict[str, list[GoldenRun]] = {}
         for key in self.golden_runs:
-            yield from golden_run_results(runs, key)
+            results = list(golden_run_results(runs, key))
+            if planned is None or key.scenario not in planned.by_name:
+                yield from results
+                continue
+            yield from (result for result in results if not result.passed)
+            runs_by_family.setdefault(planned.by_name[key.scenario].scenario.family, []).append(key)
+        for family, keys in runs_by_family.items():
+            detail = describe_family_runs(keys, once)
+            yield build_check_result(f"family {family}", "", detail)
         yield from self.judge_equal_scenarios(runs)
 
     def judge_equal_scenarios(self, runs: CheckRunByName) -> Iterator[CheckResult]:
@@ -336,6 +356,10 @@ def golden_run_results(runs: CheckRunByName, key: GoldenRun) -> Iterator[CheckRe
     if not first.problem:
         detail = null_mutant_problem(first, null)
         yield build_check_result(f"null mutant {key.key}", detail, "the same bytes as golden")
+        if (forked := runs.get((FORKED, key))) is not None and forked is not first:
+            yield build_check_result(
+                f"fork {key.key}", forked_run_problem(first, forked), "the same bytes as golden"
+            )
 
 
 def anchor_problem(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> str:
