@@ -166,7 +166,11 @@ def _plan_problems(folder: RunFolder) -> Problems:
     expected_head = replace(
         head,
         plan=plan_digest(
-            [e.id for e in plan.experiments], plan.chunks, plan.canary.id if plan.canary else "", campaign
+            [e.id for e in plan.experiments],
+            plan.chunks,
+            plan.canary.id if plan.canary else "",
+            campaign,
+            plan.drives,
         ),
         experiments=len(plan.experiments),
         campaign=campaign.name,

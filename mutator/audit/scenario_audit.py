@@ -26,6 +26,7 @@ def planned_scenario_problems(folder: RunFolder, plan: Plan) -> Iterator[Mutator
     if planned is None:
         return
     digests = {experiment.scenario: experiment.scenario_digest for experiment in plan.experiments}
+    digests |= {drive.golden_run.scenario: drive.scenario_digest for drive in plan.drives}
     if plan.canary:
         digests[plan.canary.scenario] = plan.canary.scenario_digest
     yield from planned.problems(digests)

@@ -18,6 +18,7 @@ from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.campaigns.operator_faults import OperatorFault, OperatorFaultFinder
 from mutator.campaigns.operator_selection import MutantActivity
+from mutator.campaigns.plan_tally import FaultFreeDrive
 from mutator.campaigns.sampling import evenly_spread_indices
 from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError
@@ -26,6 +27,7 @@ from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import ConcreteScenario, Experiment, Fault, Method, Trigger
 from mutator.operators.executed_lines_and_types import GoldenRunInputs
+from mutator.store.golden_runs import GoldenRun
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger, draw_trigger_time, trigger_at_time
 from mutator.workspace import Workspace
@@ -79,6 +81,15 @@ class CampaignExpansion:
         # changes within a scenario have golden runs of their own, which the experiments of a chunk share
         ordered.sort(key=lambda item: (item[0], item[1].changes))
         return tuple(experiment for _, experiment in ordered)
+
+    def fault_free_drives(self, *, several_seeds: bool) -> Iterator[FaultFreeDrive]:
+        """Yield the golden run of each scenario."""
+        self._check_change_names()
+        for name in self._scenarios:
+            scenario_digest, concrete = self._digest_and_concrete(name)
+            seed = self.seed if several_seeds else None
+            golden_run = GoldenRun(name, self.campaign.changes_in(self.reading), seed)
+            yield FaultFreeDrive(golden_run=golden_run, scenario_digest=scenario_digest, concrete=concrete)
 
     def build_canary(self) -> Experiment | None:
         canary = self.campaign.canary

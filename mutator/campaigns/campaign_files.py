@@ -12,6 +12,7 @@ from mutator.campaigns.campaign_model import CampaignModel, Canary, SelectionMod
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
     ListedTrigger,
+    TriggersModel,
     with_trigger_list_under_key,
 )
 from mutator.campaigns.expectations import Expectation
@@ -28,6 +29,7 @@ from mutator.targets.hazard_severity import SeverityScale
 SCHEMA = "campaign/1"
 _SPEC_SUFFIXES = (".yaml", ".yml")
 _Value = TypeVar("_Value")
+_NO_TRIGGERS = TriggersModel.model_construct()  # of a campaign without faults
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +91,11 @@ class Campaign:
         return self.seeds[0]
 
     @property
+    def is_fault_free(self) -> bool:
+        """Whether it only drives its scenarios without faults."""
+        return not self.fault_selections and not self.is_bench
+
+    @property
     def scenarios(self) -> tuple[str, ...]:
         """The scenarios of the library that the file names."""
         return tuple(selection for selection in self.scenario_selections if isinstance(selection, str))
@@ -134,7 +141,7 @@ def load_campaign(path: Path) -> Campaign:
     """
     model, source = load_yaml_model(path, CampaignModel, SCHEMA, prepare=with_trigger_list_under_key)
     _check_no_duplicates(model, source)
-    triggers = model.triggers
+    triggers = model.triggers or _NO_TRIGGERS
     # these names become paths in the library
     for keys, name in {("target",): model.target, ("triggers", "table"): triggers.table or ""}.items():
         with source.locating_errors(keys):

@@ -179,7 +179,9 @@ class CampaignModel(StrictModel, title="The file"):
         "list, or a list for each reading, by name.",
     )
     faults: list[SelectionModel] = Field(
-        min_length=1, description="The selections of faults. The campaign runs all of them."
+        description="The selections of faults. The campaign runs all of them. If the list is "
+        "empty, the scenarios are driven without faults, and the results are their [hazards, alerts and "
+        "margins](../how-to/drive-without-faults.md)."
     )
     reading: str | None = Field(
         None,
@@ -191,7 +193,9 @@ class CampaignModel(StrictModel, title="The file"):
         min_length=1,
         description="`guided`, `random` or both. Default: `guided`.",
     )
-    triggers: Triggers = Field(description="When faults become active.")
+    triggers: Triggers | None = Field(
+        None, description="When faults become active. Required unless `faults` is empty."
+    )
     sample: int | None = Field(
         None,
         ge=1,
@@ -245,12 +249,16 @@ class CampaignModel(StrictModel, title="The file"):
             raise ValueError("`sample`, the number of experiments, together with `proportional`")
         if self.proportional and any(selection.operators for selection in self.faults):
             raise ValueError("no `proportional` with `operators`, which have their own `sample`")
+        if bool(self.faults) is not (self.triggers is not None):
+            raise ValueError("`triggers`, because there are `faults`" if self.faults else "no `triggers`")
+        if not self.faults and self.canary is None:
+            raise ValueError("a `canary`, without which nothing shows that a hazard can be reached")
         if self.canary is None and any(selection.operators is None for selection in self.faults):
             raise ValueError("a `canary`, because `faults` has a `spec`")
         if (self.seed is None) == (self.seeds is None):
             raise ValueError(
                 "either `seed` or `seeds`" if self.seed is None else "`seed` or `seeds`, not both"
             )
-        if Method.RANDOM in self.methods and self.triggers.random_until_s is None:
+        if Method.RANDOM in self.methods and self.triggers and self.triggers.random_until_s is None:
             raise ValueError("`random_until_s` in `triggers` for random times")
         return self

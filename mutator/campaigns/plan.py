@@ -17,7 +17,13 @@ from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, check_expectation, check_readings, load_campaign
 from mutator.campaigns.chunks import chunk_lengths_of_runs
 from mutator.campaigns.neutral_faults import NeutralFaultWarner
-from mutator.campaigns.plan_tally import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
+from mutator.campaigns.plan_tally import (
+    FaultFreeDrive,
+    FaultTypeAndMethod,
+    PlanPart,
+    PlanTally,
+    plan_digest,
+)
 from mutator.campaigns.row_filters import matching_items
 from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_in_proportion
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
@@ -27,6 +33,7 @@ from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
 from mutator.store import plan_file
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_choices import Choices
+from mutator.store.planned_scenarios import planned_scenarios_of
 from mutator.store.preflight_results import mean_golden_run_cpu_s
 from mutator.store.run_folder import RunFolder
 from mutator.store.shards import Shard
@@ -74,6 +81,7 @@ class Plan:
     #: the CPU time in s at which a run is cut off; None: it follows from golden runs that have not run yet
     cpu_limit_s: int | None = None
     operator_notes: tuple[str, ...] = ()  #: how many mutants the operators produced, and what was left out
+    drives: tuple[FaultFreeDrive, ...] = ()  #: the runs of a campaign without faults
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")
@@ -96,7 +104,7 @@ class Plan:
     def empty_tally(self) -> PlanTally:
         """Return a tally without parts."""
         several = self.campaign.is_bench or len(self.seeds) > 1
-        return PlanTally(canary=self.canary, has_several_seeds=several)
+        return PlanTally(canary=self.canary, has_several_seeds=several, drives=self.drives)
 
     def parts(self) -> Iterator[PlanPart]:
         """Yield the plan as one part."""
@@ -181,7 +189,18 @@ class SeedBySeedPlan:
         return self._expansion.operator_notes
 
     def empty_tally(self) -> PlanTally:
-        return PlanTally(canary=self.canary, has_several_seeds=len(self.seeds) > 1)
+        return PlanTally(canary=self.canary, has_several_seeds=len(self.seeds) > 1, drives=self.drives)
+
+    @cached_property
+    def drives(self) -> tuple[FaultFreeDrive, ...]:
+        """The golden runs that a campaign without faults drives; none with faults."""
+        if not self.campaign.is_fault_free:
+            return ()
+        return tuple(
+            drive
+            for seed in self.seeds
+            for drive in self._expansion.with_seed(seed).fault_free_drives(several_seeds=len(self.seeds) > 1)
+        )
 
     def parts(self) -> Iterator[PlanPart]:
         """Yield the experiments of each seed that has any.
@@ -202,7 +221,7 @@ class SeedBySeedPlan:
             neutral_faults.add(part.experiments)
             if part.experiments:
                 yield part
-        if not chunks:
+        if not chunks and not self.campaign.is_fault_free:
             raise MutatorError(
                 "no experiment is left",
                 where=self.campaign.path,
@@ -260,7 +279,10 @@ def build_plan(workspace: Workspace, campaign: str | Path, choices: Choices | No
         experiments=experiments,
         chunks=chunks,
         canary=canary,
-        digest=plan_digest([e.id for e in experiments], chunks, canary.id if canary else "", loaded),
+        digest=plan_digest(
+            [e.id for e in experiments], chunks, canary.id if canary else "", loaded, planning.drives
+        ),
+        drives=planning.drives,
         runs=sum(part.run_count for part in parts),
         cpu_limit_s=None if "cpu_s" in loaded.measured_limit_names else loaded.limits.cpu_s,
         operator_notes=planning.operator_notes,
@@ -323,7 +345,27 @@ def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
         run_cpu_s=mean_golden_run_cpu_s(folder),
         cpu_limit_s=limits.cpu_s if is_limit_known else None,
         operator_notes=head.operators,
+        drives=_drives_of_run(folder) if campaign.is_fault_free else (),
     )
     if tally is not None:
         vars(plan)["tally"] = tally  # set the cached property; computing it would read every experiment
     return plan
+
+
+def _drives_of_run(folder: RunFolder) -> tuple[FaultFreeDrive, ...]:
+    """Return the drives of a campaign without faults. A canary's golden run is the last that run.json lists,
+    and is one only if the campaign names its scenario.
+    """
+    planned, campaign = planned_scenarios_of(folder.path), load_campaign_of_run(folder)
+    by_name = planned.by_name if planned else {}
+    runs = [run for run in folder.golden_runs if run.scenario in {*campaign.scenarios, *by_name}]
+    return tuple(
+        FaultFreeDrive(
+            golden_run=run,
+            scenario_digest=by_name[run.scenario].scenario.digest
+            if run.scenario in by_name
+            else folder.head.sources[f"scenario {run.scenario}"],
+            concrete=by_name[run.scenario].scenario if run.scenario in by_name else None,
+        )
+        for run in runs
+    )

@@ -136,7 +136,9 @@ def _tally_and_digest(
     plan_digest = (
         plan.digest
         if isinstance(plan, Plan)
-        else digest_builder.finish(tally.chunk_lengths, plan.canary.id if plan.canary else "", plan.campaign)
+        else digest_builder.finish(
+            tally.chunk_lengths, plan.canary.id if plan.canary else "", plan.campaign, plan.drives
+        )
     )
     return tally, plan_digest
 

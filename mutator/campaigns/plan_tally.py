@@ -28,12 +28,22 @@ class PlanPart:
     run_count: int
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultFreeDrive:
+    """A golden run that a campaign without faults drives; `concrete` is its scenario, if a family gave it."""
+
+    golden_run: GoldenRun
+    scenario_digest: str
+    concrete: ConcreteScenario | None
+
+
 @dataclass(slots=True, kw_only=True)
 class PlanTally:
     """The totals of the plan parts added so far."""
 
     canary: Experiment | None
     has_several_seeds: bool  # each seed has its own golden runs
+    drives: tuple[FaultFreeDrive, ...] = ()  # of a campaign without faults
     experiment_count: int = 0
     run_count: int = 0
     chunk_lengths: list[int] = field(default_factory=list)
@@ -41,6 +51,12 @@ class PlanTally:
     goldens_without_canary: dict[GoldenRun, None] = field(default_factory=dict)
     example_fault_by_variant: dict[str, Fault] = field(default_factory=dict)  # one fault per variant
     concrete_by_name: dict[str, ConcreteScenario] = field(default_factory=dict)  # scenarios of families
+
+    def __post_init__(self) -> None:
+        for drive in self.drives:
+            self.goldens_without_canary.setdefault(drive.golden_run)
+            if drive.concrete is not None:
+                self.concrete_by_name[drive.golden_run.scenario] = drive.concrete
 
     def add(self, part: PlanPart) -> None:
         self.experiment_count += len(part.experiments)
@@ -95,16 +111,30 @@ class PlanDigestBuilder:
             self._hash.update((self._separator + ",".join(f'"{name}"' for name in ids)).encode())
             self._separator = ","
 
-    def finish(self, chunk_lengths: Sequence[int], canary_id: str, campaign: Campaign) -> str:
+    def finish(
+        self,
+        chunk_lengths: Sequence[int],
+        canary_id: str,
+        campaign: Campaign,
+        drives: Sequence[FaultFreeDrive] = (),
+    ) -> str:
         # without its opening bracket, because it continues the list that began with the ids
         chunk_lengths = () if campaign.is_bench else chunk_lengths
         rest = [chunk_lengths, canary_id, as_json_types(campaign.canary), as_json_types(campaign.limits)]
+        if drives:
+            rest.append(sorted([drive.golden_run.key, drive.scenario_digest] for drive in drives))
         whole = self._hash.copy()  # a bench's plan can grow further
         whole.update(f"],{canonical_json(rest)[1:]}".encode())
         return whole.hexdigest()
 
 
-def plan_digest(ids: Sequence[str], chunk_lengths: Sequence[int], canary_id: str, campaign: Campaign) -> str:
+def plan_digest(
+    ids: Sequence[str],
+    chunk_lengths: Sequence[int],
+    canary_id: str,
+    campaign: Campaign,
+    drives: Sequence[FaultFreeDrive] = (),
+) -> str:
     digest_builder = PlanDigestBuilder()
     digest_builder.add(ids)
-    return digest_builder.finish(chunk_lengths, canary_id, campaign)
+    return digest_builder.finish(chunk_lengths, canary_id, campaign, drives)

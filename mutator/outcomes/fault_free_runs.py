@@ -30,7 +30,7 @@ class FaultFreeRun:
 def load_fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
     """Return the fault-free runs of a run folder, sorted by name. MutatorError if one cannot be read."""
     runs = []
-    for golden_run in sorted(folder.golden_runs):
+    for golden_run in sorted(folder.kept_goldens):
         run_folder = folder.golden_folder(*golden_run)
         trace = load_trace(manifest, run_folder)
         judged = judge_run(manifest, trace, load_target_record(manifest, run_folder))

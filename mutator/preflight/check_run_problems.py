@@ -14,6 +14,7 @@ from mutator.mutants.probe_contract import was_triggered
 from mutator.outcomes import trace_and_record_loading
 from mutator.outcomes.hazard_and_metric_judgement import load_judged_run
 from mutator.outcomes.lost_observed_values import find_value_lost_for_good
+from mutator.store.golden_verdicts import GoldenVerdict
 from mutator.targets.manifest import TargetManifest
 
 
@@ -29,6 +30,9 @@ class CheckRun:
     trace_digest: str = ""
     hazards: tuple[tuple[str, float], ...] = ()
     alerts: tuple[tuple[str, float], ...] = ()
+    t_end: float | None = None
+    metrics: tuple[tuple[str, float], ...] = ()
+    duration_s: float = 0.0
     has_triggered: bool = False
     cpu_s: float = 0.0
     third_party_modules: tuple[str, ...] = ()
@@ -52,9 +56,22 @@ def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
         trace_digest=trace_and_record_loading.trace_digest(manifest, execution.out),
         alerts=judged.alerts,
         hazards=judged.hazards,
+        t_end=judged.t_end,
+        metrics=judged.metrics,
+        duration_s=float(trace[manifest.time_channel][-1]) if len(trace[manifest.time_channel]) else 0.0,
         has_triggered=was_triggered(execution.probe_report),
         cpu_s=execution.cpu_s,
         third_party_modules=execution.third_party_modules,
+    )
+
+
+def verdict_of(run: CheckRun) -> GoldenVerdict:
+    return GoldenVerdict(
+        duration_s=run.duration_s,
+        t_end=run.t_end,
+        hazards=run.hazards,
+        alerts=run.alerts,
+        metrics=run.metrics,
     )
 
 

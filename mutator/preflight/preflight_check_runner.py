@@ -57,6 +57,7 @@ class CheckRunner:
     observation_store: ObservationStore | None = (
         None  # from which fork engines take what null mutants observe
     )
+    dropped: frozenset[GoldenRun] = frozenset()  # golden runs of which only the verdict is kept
     with_forks: bool = False  # whether most golden runs of families are driven once, in a fork
 
     def run_all(
@@ -231,9 +232,9 @@ class CheckRunner:
             run = read_check_run(self.manifest, execution)
             if name[0] == GOLDEN and name[1].seed is not None:
                 cache_layout_and_pruning.prune_target_cache(self.manifest.cache_name)
-            if name[0] == NULL_MUTANT:
+            if name[0] == NULL_MUTANT and name[1] not in self.dropped:
                 self._keep_observations(name[1], job, execution)
-            if name[0] == GOLDEN and not run.problem:
+            if name[0] == GOLDEN and not run.problem and name[1] not in self.dropped:
                 golden_folder = path_below(self.pending_folder / "golden", name[1].key)
                 golden_folder.parent.mkdir(parents=True, exist_ok=True)
                 execution.out.rename(golden_folder)
@@ -249,7 +250,7 @@ class CheckRunner:
             return CheckRun(problem=f"cannot be forked: {why}")
         try:
             run = read_check_run(self.manifest, execution)
-            if key in self.driven_once:
+            if key in self.driven_once and key not in self.dropped:
                 self._keep_observations(key, job, execution)
                 if not run.problem:
                     golden_folder = path_below(self.pending_folder / "golden", key.key)

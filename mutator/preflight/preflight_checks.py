@@ -10,7 +10,7 @@ from mutator._common import cached_folders
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below, unlink_below
 from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
-from mutator._common.hashing import digest
+from mutator._common.hashing import as_json_types, digest
 from mutator.campaigns import run_environment
 from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.campaigns.campaign_files import Campaign
@@ -30,6 +30,7 @@ from mutator.preflight.check_run_problems import (
     golden_pair_problem,
     null_mutant_problem,
     output_digest_of,
+    verdict_of,
 )
 from mutator.preflight.forked_golden_runs import describe_family_runs
 from mutator.preflight.preflight_check_runner import (
@@ -51,6 +52,7 @@ from mutator.store.checks_file import (
 )
 from mutator.store.file_digests import FileDigest
 from mutator.store.golden_runs import GoldenRun
+from mutator.store.golden_verdicts import GOLDEN_VERDICTS_KEY
 from mutator.store.preflight_results import CheckResult
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -113,7 +115,7 @@ def describe_unreached_triggers(workspace: Workspace, folder: RunFolder) -> list
 
 
 def checks_and_goldens_exist(folder: RunFolder) -> bool:
-    folders = (folder.golden_folder(*golden_run) for golden_run in folder.golden_runs)
+    folders = (folder.golden_folder(*golden_run) for golden_run in folder.kept_goldens)
     goldens = (path_below(place, name) for place in folders for name in folder.head.golden_files)
     return all(path.is_file() for path in (folder.path / CHECKS_FILE, *goldens))
 
@@ -182,7 +184,7 @@ class PreflightChecks:
     def _passed_results(self, stored: dict[str, Any] | None, folder: Path) -> tuple[CheckResult, ...] | None:
         if stored is None or stored["digest"] != self.digest:
             return None
-        keys = [golden_run.key for golden_run in self.golden_runs]
+        keys = [golden_run.key for golden_run in self.folder.kept_goldens]
         if any(
             output_digest_of(self.manifest, path_below(folder / "golden", key)) != stored["goldens"][key]
             for key in keys
@@ -213,7 +215,7 @@ class PreflightChecks:
             results.append(build_check_result("canary", canary_verdict.problem, canary_verdict.success))
         goldens = {golden_run.key: runs[GOLDEN, golden_run].output_digest for golden_run in self.golden_runs}
         self._check_goldens_same_as_before(goldens)
-        for golden_run in self.golden_runs:
+        for golden_run in self.folder.kept_goldens:
             place = path_below(self.pending_folder / "golden", golden_run.key)
             if goldens[golden_run.key] and output_digest_of(self.manifest, place) != goldens[golden_run.key]:
                 raise MutatorError(
@@ -227,6 +229,7 @@ class PreflightChecks:
             "digest": self.digest,
             "results": [asdict(result) for result in results],
             "goldens": goldens,
+            **self._verdicts_as_json(runs),
             "packages": loaded_packages(self.manifest, golden_runs),
             **unpackaged_modules_as_json(unpackaged_modules(self.manifest, golden_runs)),
             "run_cpu_s": sum(run.cpu_s for run in golden_runs) / len(golden_runs),
@@ -243,6 +246,13 @@ class PreflightChecks:
             with file_digests.announcing_rewrites(self.folder.path, {CHECKS_FILE: None}):
                 unlink_below(self.folder.path, CHECKS_FILE)
 
+    def _verdicts_as_json(self, runs: CheckRunByName) -> dict[str, Any]:
+        """Return what golden runs came to, if some are those of families, or if there is no experiment."""
+        if self.workspace.planned_scenarios is None and not self.campaign.is_fault_free:
+            return {}
+        verdicts = {key.key: as_json_types(verdict_of(runs[GOLDEN, key])) for key in self.golden_runs}
+        return {GOLDEN_VERDICTS_KEY: verdicts}
+
     def store_in_cache(self) -> None:
         """Store passed checks for other run folders."""
         cached = preflight_cache.cached_checks_path(self.digest)
@@ -254,6 +264,8 @@ class PreflightChecks:
         CheckFailed if the experiments that have a record had another one.
         """
         self._check_goldens_same_as_before({golden_run.key: output_digest})
+        if golden_run not in self.folder.kept_goldens:
+            return
         copy = self.folder.scratch_folder / "placed"
         shutil.rmtree(copy, ignore_errors=True)
         shutil.copytree(path_below(self.pending_folder / "golden", golden_run.key), copy)
@@ -274,6 +286,7 @@ class PreflightChecks:
             pending_folder=pending_folder,
             observation_store=self.observation_store,
             with_forks=self._with_forks,
+            dropped=frozenset(self.golden_runs) - set(self.folder.kept_goldens),
         )
 
     def _store_in_run_folder(self, results: Mapping[str, Any]) -> None:

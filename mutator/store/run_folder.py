@@ -196,6 +196,13 @@ class RunFolder:
         return (*self.listed_goldens, *(planned.golden_runs() if planned else ()))
 
     @property
+    def kept_goldens(self) -> tuple[GoldenRun, ...]:
+        """The golden runs whose files the folder keeps: all, but for those of families if there is no
+        experiment.
+        """
+        return self.golden_runs if self.head.experiments else self.listed_goldens
+
+    @property
     def listed_goldens(self) -> tuple[GoldenRun, ...]:
         """The golden runs of the library's scenarios, which run.json lists."""
         return tuple(map(GoldenRun.from_stored, self.head.goldens))
