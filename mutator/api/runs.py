@@ -35,6 +35,11 @@ from mutator.report.experiment_stills import take_stills
 from mutator.results import outcome_counting
 from mutator.results import table_building as results_table
 from mutator.results.note_without_canary import no_canary_note
+from mutator.statistics.fault_free_drive_tables import (
+    describe_drives,
+    each_drive_sheet,
+    load_judged_drives,
+)
 from mutator.statistics.mutation_score import mutation_score_sheet, totals_table
 from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
@@ -143,6 +148,17 @@ class Run(RunFigures):
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
         """Return the alerts and hazards of the golden runs, and the range of each plotted channel."""
         return load_fault_free_runs(self.folder, self.manifest)
+
+    def drives(self) -> "pd.DataFrame":
+        """Return a row for each golden run of a run with families or without faults: the values of its
+        parameters, its hazards, alerts and metrics. Empty for other runs.
+        """
+        return each_drive_sheet(load_judged_drives(self.folder), self.folder.head.hazards).as_frame()
+
+    def drives_note(self) -> str:
+        """Return the drives, hours, hazards and alerts of `drives` in a sentence; empty if there are none."""
+        drives = load_judged_drives(self.folder)
+        return describe_drives(drives) if drives else ""
 
     def alerts_note(self) -> str:
         """Return a sentence on the alerts that golden runs also raise; empty if there are none."""

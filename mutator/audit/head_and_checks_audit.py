@@ -88,11 +88,12 @@ def check_result_problems(folder: RunFolder) -> Problems:
     stored = read_json(path, CHECKS_SCHEMA)
     check_names = {result["name"] for result in stored["results"]}
     keys, planned = [golden_run.key for golden_run in folder.golden_runs], planned_scenarios_of(folder.path)
+    checked_alone = folder.golden_runs if folder.is_bench else folder.listed_goldens
     expected_names = [
         "anchors",
         *(["canary"] if folder.head.canary else []),
-        *(f"{kind} {run.key}" for run in folder.listed_goldens for kind in ("golden", "null mutant")),
-        *(f"family {name}" for name in (planned.families if planned else ())),
+        *(f"{kind} {run.key}" for run in checked_alone for kind in ("golden", "null mutant")),
+        *(f"family {name}" for name in (planned.families if planned and not folder.is_bench else ())),
     ]
     if missing := [name for name in expected_names if name not in check_names]:
         yield MutatorError(f"no check `{missing[0]}`", where=path, expected="the checks of all golden runs")

@@ -352,8 +352,10 @@ def _print_results_as_json(
 
 def _print_results(terminal: Terminal, run: "Run", summary: "Summary") -> None:
     """Print what does not need to wait for stills and report."""
-    if summary.results:
+    if summary.results and summary.planned:
         print_outcome_counts(terminal, run)
+    if not summary.is_provisional and (note := run.drives_note()):
+        terminal.print_text(note)
     terminal.print_text(
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now; "
         f"checks, experiments and proof took {describe_duration(summary.elapsed_s)}"

@@ -37,7 +37,8 @@ def load_golden_verdicts(folder: RunFolder) -> Mapping[str, GoldenVerdict]:
     path = folder.path / CHECKS_FILE
     stored: Mapping[str, Any] = read_json(path, CHECKS_SCHEMA) if path.is_file() else {}
     try:
-        return typed_value_from_json(dict[str, GoldenVerdict], stored.get(GOLDEN_VERDICTS_KEY, {}))
+        verdicts = stored.get(GOLDEN_VERDICTS_KEY, {})
+        return typed_value_from_json(Mapping[str, GoldenVerdict], verdicts)  # type: ignore[type-abstract]
     except TypeMisfit as err:
         raise MutatorError(
             f"damaged at '{GOLDEN_VERDICTS_KEY}' ({err.got})",

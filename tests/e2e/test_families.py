@@ -3,18 +3,20 @@
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 import mutator
 from mutator._common.files import json_bytes
 from mutator.campaigns.plan import build_plan
-from mutator.errors import MutatorError
+from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
 from mutator.store import file_digests
 from mutator.store.file_digests import FileDigest
 from mutator.store.plan_choices import Choices
 from mutator.store.planned_scenarios import SCENARIOS_FILE
+from mutator.store.preflight_results import check_results
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -129,6 +131,46 @@ def test_seeds_share_the_scenarios_of_the_first(families: Workspace) -> None:
     assert by_seed[7] == by_seed[8]
     others = {e.scenario for e in build_plan(families, "toy", Choices(seed=8)).experiments}
     assert others != by_seed[8]
+
+
+def test_a_campaign_without_faults_drives_its_scenarios(families: Workspace, tmp_path: Path) -> None:
+    campaign = families.library / "campaigns" / "toy.yaml"
+    head, _, rest = campaign.read_text().partition("faults:")
+    canary = next(line for line in rest.splitlines() if line.startswith("canary"))
+    campaign.write_text(f"{head.replace('sample: 3', 'sample: 24')}faults: []\nseed: 7\n{canary}\n")
+    out = tmp_path / "run"
+    assert run_campaign(families, "toy", out, engine="fork").exit_code == 0
+    run = mutator.load_run(out, workspace=families)
+    drives = run.drives()
+    assert len(drives) == 25
+    assert set(drives["scenario"]) == {"A", "follow"}
+    assert {"ego_mps", "gap_m", "driven_s"} <= set(drives.columns)
+    assert drives["driven_s"].min() > 5
+    assert [path.name for path in (out / "golden").iterdir()] == [
+        "A"
+    ]  # the traces of the others are not kept
+    assert run.drives_note().startswith("25 fault-free drives, ")
+    family = next(result for result in check_results(run.folder) if result.name == "family follow")
+    assert family.detail.startswith("24 golden runs, 20 of them")
+    assert mutator.verify(out, workspace=families).differences == ()
+    assert run_campaign(families, "toy", out, engine="fork").seal == run.seals.seal
+    other = tmp_path / "other"
+    assert run_campaign(families, "toy", other, engine="reference").exit_code == 0
+    pd.testing.assert_frame_equal(mutator.load_run(other, workspace=families).drives(), drives)
+
+
+def test_a_fork_that_differs_stops_the_family(
+    families: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A target that behaves otherwise in a forked process is found by the runs on the reference engine."""
+    car = families.manifest("toycar").root / "toycar" / "world.py"
+    text = car.read_text()
+    car.write_text(f"import os\n_LOADED_BY = os.getpid()\n{text}")
+    moved = "self.gap += (self.lead_speed - self.speed) * STEP"
+    assert moved in text
+    car.write_text(car.read_text().replace(moved, f"{moved} + 1e-9 * (os.getpid() != _LOADED_BY)"))
+    with pytest.raises(CheckFailed, match="a fork of the loaded target gives other bytes"):
+        run_campaign(families, "toy", tmp_path / "run", engine="fork")
 
 
 @pytest.mark.parametrize(

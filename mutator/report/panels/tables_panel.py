@@ -1,6 +1,6 @@
 """The panels of counts and statistics. The statistics are also files."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from operator import itemgetter
 
@@ -13,6 +13,12 @@ from mutator.results.outcome_counting import (
     count_outcomes_by_group,
     count_table,
     fault_types_of,
+)
+from mutator.statistics.fault_free_drive_tables import (
+    JudgedDrive,
+    drives_by_group_sheet,
+    each_drive_sheet,
+    load_judged_drives,
 )
 from mutator.statistics.metric_and_severity_tables import (
     metrics_sheet,
@@ -90,7 +96,13 @@ def build_tables_panel(run: ReportedRun) -> Panel:
     fault_free = fault_free_table(runs, alerts=run.folder.has_alerts) if runs else None
     if fault_free:
         parts += ["## Fault-free runs", FAULT_FREE_NOTE, fault_free.as_markdown()]
+    drives = load_judged_drives(run.folder)
+    if drives:
+        sheets.insert(0, _drives_sheet(run.folder, drives))
     parts += [sheet.as_markdown().rstrip() for sheet in sheets]
+    files = sheet_csv_and_markdown_files(sheets)
+    if drives:
+        files |= sheet_csv_files([each_drive_sheet(drives, run.folder.head.hazards)])
     html = rendered(
         _HTML_TEMPLATE,
         title="Tables",
@@ -105,8 +117,18 @@ def build_tables_panel(run: ReportedRun) -> Panel:
         link="Tables",
         markdown="\n\n".join(parts),
         html=html,
-        files=sheet_csv_and_markdown_files(sheets),
+        files=files,
     )
+
+
+def _drives_sheet(folder: RunFolder, drives: Sequence[JudgedDrive]) -> Sheet:
+    measured = {name for drive in drives for name, _ in drive.verdict.metrics}
+    lower_is_worse = {
+        metric.name: metric.worse
+        for metric in folder.head.metrics
+        if metric.worse == "lower" and metric.name in measured
+    }
+    return drives_by_group_sheet(drives, folder.head.hazards, lower_is_worse)
 
 
 def build_published_comparison_panel(run: ReportedRun) -> Panel | None:
