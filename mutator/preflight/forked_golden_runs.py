@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock, get_ident
 
+from mutator._common.confined_files import path_below
 from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.fork_engine import ForkEngine
@@ -53,7 +54,7 @@ class ForkedGoldenRuns:
         cls, manifest: TargetManifest, work_folder: Path, limits: Limits, null_mutant: Mutant
     ) -> "ForkedGoldenRuns":
         def make_engine(number: int) -> ForkEngine:
-            folder = work_folder / f"forks-{number}"
+            folder = path_below(work_folder, f"forks-{number}")
             folder.mkdir(parents=True, exist_ok=True)
             return ForkEngine(manifest, folder, limits, null_mutant=null_mutant)
 
@@ -65,7 +66,9 @@ class ForkedGoldenRuns:
         NotForkable and ForkServerLost as `ForkEngine.drive_fault_free` raises them.
         """
         engine = self._engine_of_thread()
-        return engine, engine.drive_fault_free(job, engine.reference.work_folder / f"golden-{job.name}")
+        return engine, engine.drive_fault_free(
+            job, path_below(engine.reference.work_folder, f"golden-{job.name}")
+        )
 
     def close(self) -> None:
         """End the servers."""
