@@ -23,6 +23,7 @@ sys.path.insert(0, str(ROOT))
 from controller_changes import CHANGES, Change, apply_change  # noqa: E402
 
 import mutator  # noqa: E402
+from mutator.model import Record  # noqa: E402
 from tests.github_runner import Runner, build_runner, git  # noqa: E402
 
 CHANGES_OF_PULL_REQUESTS = (
@@ -83,9 +84,13 @@ def make_repository(place: Path) -> Path:
 
 
 def new_hazards(runs: Path) -> set[str]:
-    """Return the experiments with a hazard in the new run that had none on the base."""
+    """Return the experiments with a hazard in the new run that they did not have on the base."""
     before, after = (dict(mutator.load_run(runs / name).folder.records()) for name in ("base", "new"))
-    return {name for name, record in after.items() if record.hazards and not before[name].hazards}
+    return {name for name, record in after.items() if hazard_names(record) - hazard_names(before[name])}
+
+
+def hazard_names(record: Record) -> set[str]:
+    return {name for name, _ in record.hazards}
 
 
 def mistakes_in_view(runner: Runner, code: int, sarif_schema: Path | None) -> list[str]:
