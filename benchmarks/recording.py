@@ -1,8 +1,9 @@
 """Measure what it costs that runs note which functions they execute, for `mutator run --since`.
 
 `python benchmarks/recording.py [--pairs 10] [--experiments 4]`, in Python 3.12 or later. Two copies of the
-harness run the same experiments alternately; in one of them, nothing is noted. The CPU time is that of all
-processes. It prints the ratio of each pair, and their mean with a 95 % interval.
+harness run the same experiments alternately, each with an empty store of finished runs; in one of them,
+nothing is noted. The CPU time is that of all processes. It prints the ratio of each pair, and their mean with
+a 95 % interval.
 """
 
 import argparse
@@ -59,7 +60,8 @@ def cpu_of_campaign(copy: Path, experiments: int, place: Path, *, records: bool)
     """Run the campaign; return the CPU time (s) of all its processes."""
     out = place / "run"
     command = [sys.executable, "-m", "mutator", "run", "recording.yaml", "--out", str(out), "-n", "0"]
-    command += ["--limit", str(experiments), "--no-reuse"]
+    command += ["--limit", str(experiments)]
+    shutil.rmtree(place / "cache" / "mutator" / "finished", ignore_errors=True)
     environment = os.environ | {"PYTHONPATH": str(copy), "XDG_CACHE_HOME": str(place / "cache")}
     with subprocess.Popen(
         command, cwd=copy, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
