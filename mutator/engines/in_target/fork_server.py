@@ -13,6 +13,7 @@ import importlib
 import importlib.util
 import io
 import marshal
+import mmap
 import operator
 import os
 import socket
@@ -67,6 +68,7 @@ def serve_as_first_process(connection_fd: int, start_message: dict[str, Any]) ->
 
 
 # what real files derive from; an `isinstance` with the abstract class `io.IOBase` takes 20 times as long
+_PID_LIMIT_FILE = Path("/proc/sys/kernel/pid_max")
 _FILE_BASE: Any = io.IOBase.__mro__[1]
 
 
@@ -87,7 +89,9 @@ class ForkingProcess:
         ] = []  # files outside the tree from which the target's packages were imported
         self.begin_run: Any = None
         self.golden_run: Any = None
-        self.waiting_children: set[int] = set()  # processes that this one forked to wait at later steps
+        # a byte for each process id, 1 for those that wait; shared, because this process adopts those that
+        # one of its children forked, when that child ends
+        self.is_waiting = mmap.mmap(-1, int(_PID_LIMIT_FILE.read_text()))
         self.loaded_files = mutant_installation.LoadedFiles()
         self.inherited_processes = 0  # processes that the run had started before this one was forked
         self.step = 0
@@ -109,7 +113,7 @@ class ForkingProcess:
         with suppress(NoLongerNeeded):
             while True:
                 request = self.receive_request()
-                reap_ended_children()
+                self.reap_ended_children()
                 reply = methods_by_request[request.pop("do")](**request)
                 if reply is not None:
                     self.send_reply(reply)
@@ -139,10 +143,10 @@ class ForkingProcess:
         prepare_to_fork()
         processes = self.count_run_processes()
         if pid := os.fork():
-            self.waiting_children.add(pid)
+            self.is_waiting[pid] = 1
         else:
             try:
-                self.waiting_children, self.inherited_processes = set(), processes
+                self.inherited_processes = processes
                 harness_socket.close()
                 self.connection.close()
                 self.connection = child_socket
@@ -206,12 +210,18 @@ class ForkingProcess:
 
     def count_run_processes(self) -> int:
         """Count the processes that the golden run has started, which its forks would share."""
-        children = set(process_guard.child_pids(os.getpid())) - self.waiting_children
-        return self.inherited_processes + len(children)
+        children = process_guard.child_pids(os.getpid())
+        return self.inherited_processes + sum(not self.is_waiting[pid] for pid in children)
+
+    def reap_ended_children(self) -> None:
+        with suppress(ChildProcessError):
+            while pid := os.waitpid(-1, os.WNOHANG)[0]:
+                self.is_waiting[pid] = 0
 
     def become_mutant(self, job: dict[str, Any], output: Any) -> NoReturn:
         """In a new child: continue the run to its end as a mutant, and report."""
         self.connection.close()
+        self.is_waiting.close()
         output.print_to_log()
         self.use_temporary_folder(job["home"])
         run_once.limit_resources(job)
@@ -322,12 +332,6 @@ def run_exit_handlers_and_flush() -> None:
                 tracked_object.flush()
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
-
-
-def reap_ended_children() -> None:
-    with suppress(ChildProcessError):
-        while os.waitpid(-1, os.WNOHANG)[0]:
-            pass
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@ killed."""
 
 import marshal
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -42,6 +43,18 @@ def test_a_fork_starts_just_before_its_fault_and_few_processes_wait(fork: Fork) 
     for step in range(3, 100, 9):
         fork.run(fork.job(trigger_at_time(0.05 * step)))
     assert len(fork.processes()) <= 10
+
+
+def test_starts_in_any_order_are_forked(fork: Fork, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that ends leaves those that it forked to one that drives on, which does not take them for
+    processes of the target.
+    """
+    monkeypatch.setattr(fork_server_processes, "_MOST_WAITING_PROCESSES", 3)
+    monkeypatch.setattr(fork_server_processes, "_MOST_STEPS_TO_ADVANCE", 0)
+    steps = list(range(1, 101, 6))
+    random.Random(1).shuffle(steps)
+    results = [fork.run(fork.job(trigger_at_time(0.05 * step))) for step in steps]
+    assert {result.fallback_reason for result in results} == {""}
 
 
 def test_libraries_that_the_golden_run_imports_late_are_loaded_before_the_fork(fork: Fork) -> None:
