@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 CHECK_RUNS_PER_GOLDEN = 2  # golden run and null mutant, for each scenario with its changes
+_BYTES_PER_DRIVE = 15_000  # the verdict and the scenario of a golden run whose trace is not kept
 _DEFAULT_RUN_CPU_S = 1.4  # one run on the reference engine, including interpreter start
 _TIME_OUTSIDE_RUNS_S = 3.0  # time that a campaign needs outside its runs
 _BYTES_PER_EXPERIMENT = 9_000  # series, patch, record and table rows of an experiment
@@ -140,12 +141,16 @@ class Plan:
     def cost(self, workers: int = 2) -> PlanCost:
         """Return the expected time and disk space."""
         goldens = len(self.goldens())
-        runs = self.runs + CHECK_RUNS_PER_GOLDEN * goldens + bool(self.canary)
+        listed = len(self.tally.listed_goldens)
+        of_families = goldens - listed  # nearly all of them are driven once
+        runs = self.runs + CHECK_RUNS_PER_GOLDEN * listed + of_families + bool(self.canary)
+        bytes_per_family_run = _BYTES_PER_GOLDEN if self.experiments else _BYTES_PER_DRIVE
+        bytes_of_goldens = listed * _BYTES_PER_GOLDEN + of_families * bytes_per_family_run
         cpu_s = runs * (self.run_cpu_s or _DEFAULT_RUN_CPU_S)
         return PlanCost(
             cpu_s=cpu_s,
             wall_s=cpu_s / max(workers, 1) + _TIME_OUTSIDE_RUNS_S,
-            disk_bytes=len(self.experiments) * _BYTES_PER_EXPERIMENT + goldens * _BYTES_PER_GOLDEN,
+            disk_bytes=len(self.experiments) * _BYTES_PER_EXPERIMENT + bytes_of_goldens,
             workers=workers,
             is_measured=self.run_cpu_s is not None,
             cpu_limit_s=self.cpu_limit_s,
