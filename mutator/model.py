@@ -80,6 +80,7 @@ class Status(StrEnum):
     TIMEOUT = "timeout"  #: the run reached its limit of time, steps or disk
     INVALID_MUTANT = "invalid_mutant"  #: the mutant does not compile, or an injected line raised an error
     HARNESS_ERROR = "harness_error"  #: the harness failed; `mutator.run` retries the experiment
+    LEFT_OUT = "left_out"  #: its golden run has a hazard, and the campaign does not include such scenarios
 
 
 class Outcome(StrEnum):
@@ -89,6 +90,27 @@ class Outcome(StrEnum):
     MASKED = "masked"  #: activated; no compared channel left its tolerance, no hazard
     SDC = "sdc"  #: a compared channel left its tolerance, no hazard
     HAZARD = "hazard"  #: a hazard followed
+    #: the golden run has a hazard, and the fault was not active before it
+    NOT_JUDGED = "not_judged"
+
+
+class GoldenClass(StrEnum):
+    """Whether the golden run of a scenario, with its changes, ends well."""
+
+    HAZARD_FREE = "hazard_free"
+    HAZARD_WITHOUT_FAULT = "hazard_without_fault"
+
+
+class AgainstGolden(StrEnum):
+    """How the hazards of a run compare with those of a golden run that has some; the first that applies."""
+
+    NOT_BEFORE = "not_before"  #: the fault was not active before golden's first hazard
+    ANOTHER = "another"  #: a hazard that the golden run has not
+    EARLIER = "earlier"  #: a hazard of golden, more than one step earlier
+    WORSE = "worse"  #: a hazard of a higher severity class than golden's worst
+    MISSING = "missing"  #: a hazard of golden does not come
+    LATER = "later"  #: a hazard of golden, more than one step later
+    SAME = "same"  #: the hazards of golden at their times
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -366,12 +388,13 @@ class Record:
     experiment_id: str  #: id of the experiment
     status: Status  #: whether the experiment itself worked
     outcome: Outcome | None  #: what the fault did; None unless the status is `ok`
-    detail: str  #: why the status is not `ok`, or why the fault was never active; else empty
+    #: why the status is not `ok`, why the fault was never active, or why it cannot be judged; else empty
+    detail: str
     tree: str  #: digest of the source tree that ran
     activation: ObservedActivation | None  #: when and how often injected statements ran; None: never
     t_manifest: float | None  #: when a compared channel first left its tolerance, in s
     max_dev: tuple[tuple[str, float], ...]  #: largest deviation of each compared channel
-    #: (name, first time in s) of each hazard after the activation, sorted by time
+    #: (name, first time in s) of each hazard after the activation, sorted by time; without `golden_hazards`
     hazards: tuple[tuple[str, float], ...]
     #: (name, first time in s) of each alert after the activation, sorted by time
     alerts: tuple[tuple[str, float], ...]
@@ -392,3 +415,7 @@ class Record:
     first_change_share: float | None = added_field(None)
     #: speeds in m/s by their names in the results, from the activation to the first hazard
     speeds: tuple[tuple[str, float], ...] = added_field(())
+    #: how the hazards compare with golden's; None if golden has none, or if the fault was never active
+    against_golden: AgainstGolden | None = added_field(None)
+    #: (name, first time in s) of each hazard in the drive that the golden run has, too, and that is no worse
+    golden_hazards: tuple[tuple[str, float], ...] = added_field(())

@@ -44,6 +44,7 @@ def open_bench(
     reading: str | None = None,
     seed: int = 0,
     after_hazard: AfterHazard | str = AfterHazard.GO_ON,
+    include: str | None = None,
     workers: int = 1,
     engine: str | None = None,
     reuse: bool = True,
@@ -56,8 +57,8 @@ def open_bench(
     commands read. It can be opened again, also after an interruption: nothing that has finished is repeated.
     At the end of the block, a sample is proved, and tables and seal are made, as at the end of a campaign.
 
-    * `canary`, `limits`: as the keys of a campaign file; default: those of `campaign`, if one is named.
-      Without a canary, results begin with a note.
+    * `canary`, `limits`, `include`: as the keys of a campaign file; default: those of `campaign`, if one is
+      named. Without a canary, results begin with a note.
     * `reading`, `after_hazard`: what all experiments have. `seed` decides what the proof draws.
     * `workers`: number of processes. `engine` and `reuse`: as for `run`.
     * `cluster`, `insecure_network`: as for `run`. What was asked for is dealt to the cluster once a record is
@@ -72,7 +73,8 @@ def open_bench(
     opened_workspace = open_workspace(workspace)
     values = _values_of_campaign(opened_workspace, campaign)
     selected_target = SelectedTarget.of(opened_workspace, target or values.pop("target", None))
-    values |= {name: value for name, value in (("canary", canary), ("limits", limits)) if value is not None}
+    arguments = {"canary": canary, "limits": limits, "include": include}
+    values |= {name: value for name, value in arguments.items() if value is not None}
     values |= {
         "target": selected_target.manifest.name,
         "reading": _checked_reading(opened_workspace, reading),
@@ -194,6 +196,7 @@ def _warn_of_end(summary: Summary | None) -> None:
         return
     if summary.exit_code == EXIT_CHECK_FAILED:
         text = "no experiment reached a hazard, and without a canary nothing shows that one can be reached"
+        text = summary.golden_hazards_note if summary.has_left_out_all else text
         warnings.warn(text, MutatorWarning, stacklevel=4)
     else:
         warnings.warn(describe_unfinished(summary), IncompleteRun, stacklevel=4)
@@ -209,8 +212,8 @@ def _checked_reading(workspace: Workspace, reading: str | None) -> str:
 
 
 def _values_of_campaign(workspace: Workspace, campaign: str | Path | None) -> dict[str, Any]:
-    """Return name and purpose of a bench, and what it takes over from a campaign: target, canary, and the
-    limits that its file names.
+    """Return name and purpose of a bench, and what it takes over from a campaign: target, canary, the
+    scenarios that it includes, and the limits that its file names.
     """
     values: dict[str, Any] = {"name": "bench", "about": "Experiments that were asked for in batches."}
     if campaign is None:
@@ -219,6 +222,8 @@ def _values_of_campaign(workspace: Workspace, campaign: str | Path | None) -> di
     values["target"] = loaded.target
     if loaded.canary is not None:
         values["canary"] = asdict(loaded.canary)
+    if loaded.include is not None:
+        values["include"] = loaded.include.value
     if limits := loaded.yaml_source.data.get("limits"):
         values["limits"] = dict(limits)
     return values

@@ -100,6 +100,8 @@ def _check_since(since: str | Path | None, cluster: str | None, *, reuse: bool) 
 
 
 def describe_unfinished(summary: Summary) -> str:
+    if summary.has_left_out_all:
+        return summary.golden_hazards_note
     parts = [f"experiments with a result: {summary.done} of {summary.planned}"]
     if summary.harness_errors:
         name, detail = summary.harness_errors[0]

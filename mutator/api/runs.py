@@ -34,6 +34,7 @@ from mutator.report import report_builder
 from mutator.report.experiment_stills import take_stills
 from mutator.results import outcome_counting
 from mutator.results import table_building as results_table
+from mutator.results.note_on_golden_hazards import golden_hazards_note
 from mutator.results.note_without_canary import no_canary_note
 from mutator.statistics.fault_free_drive_tables import (
     describe_drives,
@@ -167,6 +168,12 @@ class Run(RunFigures):
     def no_canary_note(self) -> str:
         """Return a sentence on the first hazard of a campaign without a canary; empty if it has a canary."""
         return no_canary_note(self.folder, self._results_frame)
+
+    def golden_hazards_note(self) -> str:
+        """Return which experiments were left out because their golden run has a hazard, or how they are
+        judged; empty if none has.
+        """
+        return golden_hazards_note(self.folder, self._results_frame)
 
     def experiment(self, id: str) -> RunExperiment:
         """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""

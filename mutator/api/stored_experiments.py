@@ -194,7 +194,7 @@ class StoredExperiment(ExperimentResult):
         return self.run.sentences
 
     def _columns(self) -> Sequence[PlanColumn | ResultColumn]:
-        return result_columns_of(self.run.folder.head)
+        return result_columns_of(self.run.folder)
 
     def _fault_paths(self) -> FaultPathFinder | None:
         return self.run.fault_paths

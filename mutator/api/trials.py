@@ -19,11 +19,13 @@ from mutator.figures.golden_and_faulty_plot import save_figure
 from mutator.model import Experiment, Method, Record
 from mutator.outcomes.hazard_and_metric_judgement import load_judged_run
 from mutator.outcomes.trace_and_record_loading import Trace, load_trace
+from mutator.results.columns_of_golden_hazards import golden_class_columns
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.finished_experiments_and_columns import ResultColumn
 from mutator.results.plan_columns import PlanColumn
 from mutator.results.severity_and_sentence_columns import severity_and_time_columns
 from mutator.results.table_columns import result_columns
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.trial_file import StoredTrial
 from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
@@ -96,8 +98,16 @@ class Trial(ExperimentResult):
         compared = [channel.name for channel in self.manifest.compared_channels]
         severity = severity_and_time_columns(has_classes=self.scale is not None)
         metrics = metric_facts(self.manifest)
+        golden_key = GoldenRun.for_experiment(self.experiment, several_seeds=False).key
         return result_columns(
-            self.manifest.hazard_names, compared, metrics, severity, speed=bool(self.manifest.speed)
+            self.manifest.hazard_names,
+            compared,
+            metrics,
+            severity,
+            speed=bool(self.manifest.speed),
+            golden_classes=golden_class_columns((golden_key,), several_seeds=False)
+            if self.record.against_golden
+            else (),
         )
 
     def _channels(self) -> Sequence[ChannelFacts]:

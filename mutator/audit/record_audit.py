@@ -67,7 +67,8 @@ def mutant_problems(
     experiments = {experiment.id: experiment for experiment in plan_file.load_experiments(folder.path)}
     built: dict[tuple[str, Trigger], tuple[str, str]] = {}
     for recorded in records:
-        if (experiment := experiments.get(recorded.record.experiment_id)) is None:
+        experiment = experiments.get(recorded.record.experiment_id)
+        if experiment is None or recorded.record.status is Status.LEFT_OUT:  # it has no mutant
             continue
         key = (experiment.fault.id, experiment.trigger)
         if key not in built:
@@ -140,7 +141,12 @@ _Contradictions = Iterator[tuple[str, str]]  # found, expected
 
 def _verdict_contradictions(record: Record) -> _Contradictions:
     activation = record.activation
-    expected = outcome_of(activation=activation, t_manifest=record.t_manifest, hazards=record.hazards)
+    expected = outcome_of(
+        activation=activation,
+        t_manifest=record.t_manifest,
+        hazards=record.hazards,
+        against_golden=record.against_golden,
+    )
     if record.outcome != expected:
         yield f"outcome {record.outcome}", f"{expected}, which follows from the recorded times"
     if record.t_manifest is not None and (activation is None or record.t_manifest < activation.first):
@@ -151,6 +157,8 @@ def _verdict_contradictions(record: Record) -> _Contradictions:
     if activation and not (activation.first <= activation.last and activation.count > 0):
         got = f"active {counted(activation.count, 'time')}, from {activation.first} s to {activation.last} s"
         yield got, "at least one activation, the first not after the last"
+    if record.golden_hazards and record.against_golden is None:
+        yield f"hazards of golden {record.golden_hazards}", "how they compare with those of the golden run"
     if len(record.trace_digest) != _DIGEST_DIGITS:
         yield f"trace digest '{record.trace_digest}'", "that of the recorded trace"
 
@@ -165,6 +173,8 @@ def _failed_run_contradictions(record: Record) -> _Contradictions:
         "metrics": record.metrics,
         "left": record.left,
         "hazards": record.hazards,
+        "against_golden": record.against_golden,
+        "golden_hazards": record.golden_hazards,
         "alerts": record.alerts,
         "trace_digest": record.trace_digest,
     }
@@ -177,7 +187,7 @@ def _target_contradictions(record: Record, head: RunHead, tolerances: Mapping[st
     """Hazards or channels that the target does not have, and differences beyond the tolerance without a
     manifestation.
     """
-    unknown = [name for name, _ in record.hazards if name not in head.hazards]
+    unknown = [name for name, _ in (*record.hazards, *record.golden_hazards) if name not in head.hazards]
     if unknown:
         yield f"hazard {unknown[0]}", f"one of {', '.join(head.hazards)}"
     channels = [name for name, _ in record.max_dev]

@@ -8,6 +8,7 @@ from pathlib import Path
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator._common.hashing import digest
+from mutator.audit.golden_hazard_audit import golden_hazard_problems, left_out_problems
 from mutator.audit.head_and_checks_audit import check_result_problems as checks_of
 from mutator.audit.head_and_checks_audit import (
     not_activated_run_problems,
@@ -79,6 +80,7 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
     )
     manifest = workspace.manifest(head.target) if workspace and not source_check.differences else None
     records, proven = load_stored_records(folder, "records"), load_stored_records(folder, "proof")
+    golden_hazards = golden_hazard_problems(folder, manifest) if manifest else ()
     idle = not_activated_run_problems(folder, manifest, records) if manifest else ()
     checks = [
         AuditCheck.from_problems(
@@ -92,7 +94,7 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
         AuditCheck.from_problems(
             "golden runs that match the checks",
             _golden_run_count(folder),
-            chain(checks_of(folder), _golden_problems(folder), idle),
+            chain(checks_of(folder), _golden_problems(folder), golden_hazards, idle),
         ),
         source_check,
     ]
@@ -113,7 +115,7 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
         AuditCheck.from_problems(
             "verdicts that follow from what was recorded",
             len(records),
-            verdict_problems(head, records, manifest),
+            chain(verdict_problems(head, records, manifest), left_out_problems(folder, records)),
         ),
         AuditCheck.from_problems(
             "records of the proof that match those of the run",
@@ -179,6 +181,7 @@ def _plan_problems(folder: RunFolder) -> Problems:
         target=campaign.target,
         chunks=recomputed_chunks(folder),
         limits=campaign.limits,
+        include=campaign.include,
         goldens=tuple(golden_run.to_stored() for golden_run in plan.tally.listed_goldens),
         canary_hazard=campaign.canary.hazard if campaign.canary else None,
     )

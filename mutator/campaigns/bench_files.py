@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -15,7 +15,7 @@ from mutator.campaigns.campaign_model import Canary
 from mutator.campaigns.campaign_triggers import EVERY_READING
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.errors import MutatorError
-from mutator.model import AfterHazard, Limits, Method
+from mutator.model import AfterHazard, GoldenClass, Limits, Method
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
 
@@ -34,6 +34,7 @@ class BenchModel(StrictModel, title="The file"):
     after_hazard: Annotated[AfterHazard, Field(strict=False)] = Field(
         AfterHazard.GO_ON, description="Whether runs end at their first terminal hazard (`stop`)."
     )
+    include: Literal["hazard_without_fault"] | None = Field(None, description="As in a campaign.")
     canary: YamlRecord[Canary] | None = Field(None, description="As in a campaign.")
     limits: YamlRecord[Limits] = Field(Limits(), description="As in a campaign.")
 
@@ -103,6 +104,7 @@ def load_bench_file(path: Path) -> Campaign:
         chunk_size=EXPERIMENTS_PER_CHUNK,
         after_hazard=model.after_hazard,
         yaml_source=source,
+        include=GoldenClass(model.include) if model.include else None,
         is_bench=True,
     )
 

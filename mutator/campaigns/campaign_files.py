@@ -23,7 +23,7 @@ from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring
 from mutator.errors import MutatorError
 from mutator.faults.library_readings import SpecReadings
-from mutator.model import AfterHazard, Limits, Method
+from mutator.model import AfterHazard, GoldenClass, Limits, Method
 from mutator.targets.hazard_severity import SeverityScale
 
 SCHEMA = "campaign/1"
@@ -83,6 +83,7 @@ class Campaign:
     after_hazard: AfterHazard
     yaml_source: YamlSource
     expectation: Expectation | None = None  # what results may be under pytest; None: anything
+    include: GoldenClass | None = None  # scenarios that run although their golden run has a hazard
     is_bench: bool = False  # what a bench fixed when it was opened; its experiments come in batches
 
     @property
@@ -186,6 +187,7 @@ def load_campaign(path: Path) -> Campaign:
         after_hazard=model.after_hazard,
         yaml_source=source,
         expectation=model.expect,
+        include=GoldenClass(model.include) if model.include else None,
     )
 
 

@@ -1,7 +1,7 @@
 """The schema of a campaign file."""
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import (
     AfterValidator,
@@ -228,6 +228,12 @@ class CampaignModel(StrictModel, title="The file"):
         description="`stop` ends each faulty run at its first [terminal "
         "hazard](../explanation/verdicts.md#the-end-of-the-drive). This saves time, but later "
         "hazards and alerts are not observed.",
+    )
+    include: Literal["hazard_without_fault"] | None = Field(
+        None,
+        description="`hazard_without_fault` also runs faults in scenarios whose golden run has a hazard, and "
+        "[judges them by what they add](../explanation/verdicts.md#golden-runs-with-a-hazard). Default: such "
+        "experiments are left out.",
     )
     expect: YamlRecord[Expectation] | None = Field(
         None,

@@ -209,6 +209,7 @@ def _build_head(
         experiments=tally.experiment_count,
         runs=tally.run_count,
         limits=plan.campaign.limits,
+        include=plan.campaign.include,
         **vars(collect_target_facts(workspace, manifest)),
         phrases=phrases_of_campaign(workspace, plan.campaign, manifest, plan.reading, used),
         goldens=tuple(golden.to_stored() for golden in tally.listed_goldens),

@@ -214,6 +214,7 @@ class GrowingPlan:
             experiments=0,
             runs=0,
             limits=campaign.limits,
+            include=campaign.include,
             bench=BenchFacts(origin=origin),
             **vars(collect_target_facts(self._workspace, self._manifest)),
             goldens=(),

@@ -123,6 +123,7 @@ class PlanDigestBuilder:
         rest = [chunk_lengths, canary_id, as_json_types(campaign.canary), as_json_types(campaign.limits)]
         if drives:
             rest.append(sorted([drive.golden_run.key, drive.scenario_digest] for drive in drives))
+        rest += [campaign.include] if campaign.include else []
         whole = self._hash.copy()  # a bench's plan can grow further
         whole.update(f"],{canonical_json(rest)[1:]}".encode())
         return whole.hexdigest()

@@ -31,7 +31,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import limits_before_measuring, measure_limits
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import NotForkable
-from mutator.model import Experiment, Limits
+from mutator.model import Experiment, GoldenClass, Limits
 from mutator.mutants.injected_line_syntax import target_line_of
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe_contract import is_probe_path
@@ -42,6 +42,7 @@ from mutator.preflight.check_run_problems import (
     null_mutant_problem,
     read_check_run,
 )
+from mutator.store.checks_file import HazardTimes, describe_golden_hazards
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
@@ -119,11 +120,11 @@ class _RunningCheck:
                 return findings  # failed runs allow no further findings
             findings += (
                 self._clock_findings(goldens)
-                if all(finding.level is CheckState.OK for finding in findings)
+                if not any(finding.level is CheckState.FAIL for finding in findings)
                 else []
             )
             findings.append(
-                self._forking_finding(goldens, is_deterministic=findings[0].level is CheckState.OK)
+                self._forking_finding(goldens, is_deterministic=findings[0].level is not CheckState.FAIL)
             )
             for name, golden in goldens.items():
                 self._record_reach(name, self.usual_changes, golden.watched_counting)
@@ -186,7 +187,7 @@ class _RunningCheck:
     # Determinism
 
     def _golden_runs_finding(self, scenario: str, golden: _GoldenRuns) -> Finding:
-        """Check that the runs give the same bytes and reach no hazard."""
+        """Check that the runs give the same bytes. A hazard is a warning."""
         name = f"golden {scenario}"
         first, watched, again = (
             self._check_run(execution) for execution in (golden.first, golden.watched_counting, golden.again)
@@ -194,6 +195,8 @@ class _RunningCheck:
         problem = golden_pair_problem(first, again)
         if not problem and not (problem := null_mutant_problem(first, watched)):
             success = f"the same bytes twice, in {golden.first.cpu_s:.1f} s of CPU each"
+            if first.hazards:
+                return _golden_hazard_finding(name, success, first.hazards)
             return Finding(name=name, level=CheckState.OK, found=success)
         if first.problem or again.problem or watched.problem or first.output_digest == again.output_digest:
             remedy = "fix the target, the scenario or the manifest: no campaign can start"
@@ -381,6 +384,16 @@ class _RunningCheck:
             found=f"{experiment.fault.spec} in {experiment.scenario} {verdict.problem or verdict.success}",
             remedy=verdict.remedy,
         )
+
+
+def _golden_hazard_finding(name: str, success: str, hazards: HazardTimes) -> Finding:
+    kind = GoldenClass.HAZARD_WITHOUT_FAULT
+    return Finding(
+        name=name,
+        level=CheckState.WARN,
+        found=f"{success}; {kind}: {describe_golden_hazards(hazards)}",
+        remedy=f"campaigns leave its experiments out, unless they `include: {kind}`",
+    )
 
 
 def _forking_refusal_by_threads(execution: JobResult) -> NotForkable | None:

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 MOST_LISTED_FINDINGS = 20  # experiments listed in the terminal; the written comparison lists all of them
 GATES_HELP = (
     "new-hazard, new-silent-hazard (no alert comes before it; new, or its alert is lost), other-hazard, "
-    "higher-severity, earlier-hazard, lost-alert, worse, new-crash, harness-error, unmatched, severity:CLASS "
-    "(S0 to S3: RUN_B has a hazard of that class or worse, RUN_A a milder one or none)"
+    "golden-hazard (without any fault), higher-severity, earlier-hazard, lost-alert, worse, new-crash, "
+    "harness-error, unmatched, severity:CLASS (S0 to S3: RUN_B has a hazard of that class or worse, RUN_A a "
+    "milder one or none)"
 )
 
 
@@ -35,7 +36,7 @@ Examples:
   mutator compare runs/before runs/after
   mutator compare runs/before runs/after --only 'module == "vision_input"'
   mutator compare runs/main runs/change \\
-    --fail-on new-hazard,new-silent-hazard,other-hazard,new-crash,harness-error,unmatched
+    --fail-on new-hazard,new-silent-hazard,other-hazard,golden-hazard,new-crash,harness-error,unmatched
   mutator compare runs/main runs/change --fail-on severity:S2
   mutator compare runs/main runs/change --fail-on new-hazard --github
 

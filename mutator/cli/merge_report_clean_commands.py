@@ -37,6 +37,8 @@ def register(app: typer.Typer) -> None:
 def print_outcome_counts(terminal: Terminal, run: "Run") -> None:
     if note := run.no_canary_note():
         terminal.print_text(note, style="bold")
+    if note := run.golden_hazards_note():
+        terminal.print_text(note, style="bold")
     counts = run.counts()
     important = {"any hazard", "hazard, no alert"}
     terminal.print_table(

@@ -288,6 +288,7 @@ def _print_results(terminal: Terminal, run: "Run", summary: "Summary") -> None:
     )
     for note in (
         summary.provisional_note,
+        "" if summary.results else summary.golden_hazards_note,
         summary.reuse_note,
         summary.since_note,
         summary.selection_note,

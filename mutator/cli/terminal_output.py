@@ -38,6 +38,8 @@ STYLE_BY_ENDING = {
     "sdc": "yellow",
     "masked": "cyan",
     "not_activated": "dim",
+    "not_judged": "dim",
+    "left_out": "dim",
     "crashed": "magenta",
     "timeout": "magenta",
     "invalid_mutant": "bold magenta",

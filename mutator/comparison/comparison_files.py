@@ -28,6 +28,7 @@ _WORSE_CHANGE_NAMES = frozenset(gate.value for gate in Gate)
 _BETTER_CHANGE_NAMES = frozenset(
     kind.value
     for kind in (
+        ResultChangeKind.GOLDEN_HAZARD_GONE,
         ResultChangeKind.HAZARD_GONE,
         ResultChangeKind.LOWER_SEVERITY,
         ResultChangeKind.LATER_HAZARD,

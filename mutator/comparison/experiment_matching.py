@@ -8,7 +8,7 @@ from enum import StrEnum
 from functools import cached_property
 
 from mutator.comparison.compared_runs import ComparedRun, experiment_key
-from mutator.model import Experiment, Outcome, Status
+from mutator.model import Experiment, GoldenClass, Outcome, Status
 from mutator.results.result_rows import ResultRow
 
 # a fault that never ran did as little harm as one that was masked
@@ -21,6 +21,7 @@ class ResultChangeKind(StrEnum):
     the changes for the worse.
     """
 
+    GOLDEN_HAZARD = "golden-hazard"
     NEW_SILENT_HAZARD = "new-silent-hazard"
     NEW_HAZARD = "new-hazard"
     OTHER_HAZARD = "other-hazard"
@@ -36,6 +37,7 @@ class ResultChangeKind(StrEnum):
     NEW_CRASH = "new-crash"
     CRASH_GONE = "crash-gone"
     HARNESS_ERROR = "harness-error"
+    GOLDEN_HAZARD_GONE = "golden-hazard-gone"
     HARNESS_ERROR_GONE = "mended"  # a result, although the first run has none
     OTHER_HARMLESS_OUTCOME = (
         "otherwise"  # another outcome that is neither better nor worse: masked or not activated
@@ -107,6 +109,9 @@ def match_experiments(a: ComparedRun, b: ComparedRun) -> ExperimentMatching:
 
 
 def _change_kinds_between(a: ResultRow, b: ResultRow) -> Iterable[ResultChangeKind]:
+    if _has_golden_hazard(a) != _has_golden_hazard(b):
+        is_new = _has_golden_hazard(b)
+        yield ResultChangeKind.GOLDEN_HAZARD if is_new else ResultChangeKind.GOLDEN_HAZARD_GONE
     if not (a.usable and b.usable):
         if a.usable != b.usable:
             yield ResultChangeKind.HARNESS_ERROR if a.usable else ResultChangeKind.HARNESS_ERROR_GONE
@@ -119,6 +124,10 @@ def _change_kinds_between(a: ResultRow, b: ResultRow) -> Iterable[ResultChangeKi
     if a.severity != b.severity:
         yield ResultChangeKind.HIGHER_SEVERITY if a.severity < b.severity else ResultChangeKind.LOWER_SEVERITY
     yield from _alert_change_kinds(a, b)
+
+
+def _has_golden_hazard(row: ResultRow) -> bool:
+    return row.golden_class == GoldenClass.HAZARD_WITHOUT_FAULT
 
 
 def _alert_change_kinds(a: ResultRow, b: ResultRow) -> Iterable[ResultChangeKind]:

@@ -46,6 +46,8 @@ SceneOfEachRun = tuple[dict[str, Any] | None, dict[str, Any] | None]
 class Gate(StrEnum):
     """What a gate fails on: a change for the worse, or an unmatched experiment."""
 
+    #: the second run's golden run has a hazard without any fault, although the first run's has none
+    GOLDEN_HAZARD = ResultChangeKind.GOLDEN_HAZARD.value
     NEW_HAZARD = ResultChangeKind.NEW_HAZARD.value  #: a hazard, although the first run has none
     #: a hazard without an alert before it, although the first run has no such hazard, or an alert before it
     NEW_SILENT_HAZARD = ResultChangeKind.NEW_SILENT_HAZARD.value

@@ -31,6 +31,22 @@ class RunMode(StrEnum):
 MODES_TO_PROVE = frozenset(mode.value for mode in RunMode if mode is not RunMode.REFERENCE)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoldenEnd:
+    """Where a terminal hazard ends a golden run: how many rows of its trace come before, and how many it has
+    in all.
+    """
+
+    rows_before: int
+    row_count: int
+
+    def is_after_step(self, step: int, step_count: int) -> bool:
+        """Whether the run has not ended before `step`, of `step_count`. No, if the rows of the trace are not
+        those of the steps, of which a row before the first step is none.
+        """
+        return self.row_count in (step_count, step_count + 1) and step < self.rows_before
+
+
 @dataclass(frozen=True, kw_only=True)
 class Job:
     """One run of the target. `changed_files` are the changed and new files of its tree; empty if pristine."""
@@ -50,7 +66,7 @@ class Job:
     # drive by the manifest's stepwise function, as forks do, and report what a fork of it must know
     drive_step_by_step: bool = False
     stop_at_hazard: bool = False  # end the run at its first terminal hazard
-    golden_has_terminal_hazard: bool = False  # whether the golden run has a terminal hazard, too
+    golden_end: GoldenEnd | None = None  # where a terminal hazard ends the golden run, too
     # like `keep_observations`; also note calls that make a target nondeterministic
     watch_nondeterminism: bool = False
     note_executed_lines: bool = False  # note which lines of the tree run from the first observation on

@@ -3,7 +3,7 @@
 Results equal the reference engine's byte for byte. The reference engine runs mutants that cannot be forked,
 and reruns those that crash, but for crashes of confirmed kinds (`crashes_in_forks`). The `warm` engine
 forks before the first step. So does this engine if a run stops at its first terminal hazard and the golden
-run has one, too.
+run reaches one before the fault is active.
 """
 
 import marshal
@@ -187,11 +187,12 @@ class ForkEngine:
         if self._forks_before_first_step:
             return self._fork_before_first_step(job, folder, swap)
         observations = self._golden_observations(job, job.golden_folder)
-        if (
-            job.stop_at_hazard and job.golden_has_terminal_hazard
-        ):  # the run can stop before the fault is active, and so before a fork
-            return self._fork_before_first_step(job, folder, swap)
         fork_point = find_fork_point(job.probe_source, observations)
+        if job.stop_at_hazard and job.golden_end is not None:
+            step_count = len(observations.counts_before_steps)
+            if fork_point is None or not job.golden_end.is_after_step(fork_point.step, step_count):
+                # the run stops before the fault is active, and so before a fork
+                return self._fork_before_first_step(job, folder, swap)
         if fork_point is None:
             return _golden_result_of_inactive_fault(job, job.golden_folder, observations.executed_functions)
         return self._run_in_fork(

@@ -74,7 +74,7 @@ class ExperimentItem(CampaignItem):
     def runtest(self) -> None:
         try:
             with raising_disk_full(self.config.rootpath):
-                problems = self._source.ensure_runner().run(self.listed)
+                ending = self._source.ensure_runner().run(self.listed)
         except Exception as err:
             error = reported_error(err)
             problem = str(error) if error else _describe_defect(err, self.name)
@@ -82,8 +82,10 @@ class ExperimentItem(CampaignItem):
             if isinstance(error, DiskFull | ResourceShortage):
                 self.session.shouldstop = problem
             raise
-        if problems:
-            raise PytestItemFailed("\n".join(problems))
+        if ending.problems:
+            raise PytestItemFailed("\n".join(ending.problems))
+        if ending.reason_left_out:
+            pytest.skip(f"left out: {ending.reason_left_out}")
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
         file, line = self.listed.place

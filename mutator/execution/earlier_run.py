@@ -106,5 +106,6 @@ def _failed_experiments(folder: RunFolder) -> frozenset[str]:
     return frozenset(
         ending.experiment_id
         for ending in endings_of(folder.records())
-        if ending.status != Status.OK.value or ending.outcome == Outcome.HAZARD.value
+        if ending.status not in (Status.OK.value, Status.LEFT_OUT.value)
+        or ending.outcome == Outcome.HAZARD.value
     )

@@ -12,10 +12,15 @@ from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines.engine_jobs import Engine, Job, JobResult, RunMode
 from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError
+from mutator.execution.golden_hazards import LEAVING_OUT, GoldenHazardRules, reason_left_out
 from mutator.execution.inactivity_check import InactivityCheck
 from mutator.execution.loaded_goldens import LoadedGoldens, changed_file_error
+from mutator.execution.records_without_outcome import (
+    record_of_mutant_without_outcome,
+    record_without_outcome,
+)
 from mutator.faults.fault_models import FaultModels
-from mutator.model import AfterHazard, Experiment, ObservedActivation, Record, Status
+from mutator.model import AfterHazard, AgainstGolden, Experiment, ObservedActivation, Record, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe_contract import activation_of
 from mutator.outcomes import golden_trace_comparison, trace_and_record_loading
@@ -30,6 +35,7 @@ from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, load_judg
 from mutator.outcomes.lost_observed_values import find_lost_value
 from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.outcomes.verdict_rules import first_events_after, outcome_of
+from mutator.store.checks_file import describe_golden_hazards
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
@@ -98,6 +104,7 @@ class ExperimentRunner:
         goldens: LoadedGoldens,
         scenario_file: Callable[[str], Path],
         *,
+        golden_hazard_rules: GoldenHazardRules = LEAVING_OUT,
         with_series: bool = False,
         inactivity_check: InactivityCheck | None = None,
         find_copied_run: FindCopiedRun = find_nothing,
@@ -110,14 +117,21 @@ class ExperimentRunner:
         self.scenario_file = cache(scenario_file)
         self.with_series = with_series
         self._find_copied_run = find_copied_run
+        self._golden_hazard_rules = golden_hazard_rules
 
     def run(self, experiments: Iterable[Experiment]) -> Iterator[RecordedExperiment]:
         """Yield each experiment with its record.
 
-        A mutant that cannot be built is not run, nor an experiment that gets a copied run. Experiments that
-        share a run get the same record.
+        Experiments that the golden hazard rules leave out come first. A mutant that cannot be built is not
+        run, nor an experiment that gets a copied run. Experiments that share a run get the same record.
         """
-        shared = {same[0].id: same for same in group_by_run(self.manifest, experiments)}
+        shared: dict[str, list[Experiment]] = {}
+        for same in group_by_run(self.manifest, experiments):
+            self.goldens.read_and_verify_files_of(same[0])
+            if self._golden_hazard_rules.leaves_out(self.goldens, same[0]):
+                yield from map(self._leave_out, same)
+            else:
+                shared[same[0].id] = same
         for finished in self._run_distinct([same[0] for same in shared.values()]):
             yield finished
             for other in shared[finished.experiment.id][1:]:
@@ -154,6 +168,11 @@ class ExperimentRunner:
             yield self._finish_run(*started.pop(job.name), execution)
         yield from without_job
 
+    def _leave_out(self, experiment: Experiment) -> RecordedExperiment:
+        reason = reason_left_out(experiment, self.goldens.hazards_of(experiment))
+        record = record_without_outcome(experiment.id, Status.LEFT_OUT, reason)
+        return RecordedExperiment(experiment=experiment, record=record)
+
     def _copy_run(self, experiment: Experiment, mutant: Mutant, run: CopiedRun) -> RecordedExperiment:
         series = None
         if self.with_series and run.faulty_series is not None:
@@ -183,7 +202,7 @@ class ExperimentRunner:
             ids_before_anchor=mutant.ids_before_anchor,
             golden_folder=self.goldens.folder_of(experiment),
             stop_at_hazard=stop,
-            golden_has_terminal_hazard=stop and self.goldens.has_terminal_hazard(experiment),
+            golden_end=self.goldens.end_of(experiment) if stop else None,
             note_executed_functions=True,
         )
 
@@ -192,7 +211,7 @@ class ExperimentRunner:
         place = f"{self.manifest.tree.path_as_in_specs(err.where)}: " if err.where else ""
         return RecordedExperiment(
             experiment=experiment,
-            record=_record_of_mutant_without_outcome(experiment, status, place + err.got, None),
+            record=record_of_mutant_without_outcome(experiment, status, place + err.got, None),
         )
 
     def _finish_run(self, experiment: Experiment, mutant: Mutant, execution: JobResult) -> RecordedExperiment:
@@ -200,7 +219,7 @@ class ExperimentRunner:
         try:
             record, faulty = self._build_record(experiment, mutant, execution)
         except (BadOutput, BadAddition) as err:
-            record = _record_of_mutant_without_outcome(
+            record = record_of_mutant_without_outcome(
                 experiment, Status.HARNESS_ERROR, _describe_problem(err), mutant
             )
         self._check_input_unchanged(experiment, execution)
@@ -260,7 +279,7 @@ class ExperimentRunner:
         except BadOutput as err:
             if activation is None:
                 raise
-            return _record_of_mutant_without_outcome(
+            return record_of_mutant_without_outcome(
                 experiment, Status.CRASHED, _describe_problem(err), mutant, activation
             ), None
         record = self._record_of_completed_run(experiment, mutant, execution, faulty, judged)
@@ -279,7 +298,7 @@ class ExperimentRunner:
         if execution.was_stopped_at_hazard:
             if judged.t_end is None:
                 why = "was stopped, but no terminal hazard is in its trace"
-                return _record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, why, mutant)
+                return record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, why, mutant)
             reference = trace_and_record_loading.trace_until(reference, faulty[time][-1], time)
         faulty = trace_and_record_loading.with_golden_times(reference, faulty, time)
         if lost := find_lost_value(self.manifest, reference, faulty, judged.t_end):
@@ -287,14 +306,17 @@ class ExperimentRunner:
             status, detail = (
                 (Status.HARNESS_ERROR, f"{lost}: {problem}") if problem else (Status.CRASHED, str(lost))
             )
-            bare = _record_of_mutant_without_outcome(experiment, status, detail, mutant, activation)
+            bare = record_of_mutant_without_outcome(experiment, status, detail, mutant, activation)
             return bare if problem else replace(bare, t_end=lost.time_s)
         difference = golden_trace_comparison.compare_traces(
             reference, faulty, self.manifest.compared_channels, time, judged.t_end
         )
         if problem := _reason_not_by_fault(difference.t_first, activation):
-            return _record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, problem, mutant)
-        hazards = first_events_after(judged.hazards, activation)
+            return record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, problem, mutant)
+        compared = self._golden_hazard_rules.compare(
+            self.goldens, experiment, judged, activation, was_stopped=execution.was_stopped_at_hazard
+        )
+        hazards = compared.hazards
         end = hazards[0][1] if hazards else judged.t_end
         change = first_actuator_change(
             reference, faulty, self.manifest.compared_channels, time, difference.t_first
@@ -302,8 +324,13 @@ class ExperimentRunner:
         return Record(
             experiment_id=experiment.id,
             status=Status.OK,
-            outcome=outcome_of(activation=activation, t_manifest=difference.t_first, hazards=hazards),
-            detail=self._reason_inactive(experiment, execution) if activation is None else "",
+            outcome=outcome_of(
+                activation=activation,
+                t_manifest=difference.t_first,
+                hazards=hazards,
+                against_golden=compared.case,
+            ),
+            detail=self._detail(experiment, execution, compared.case, activation),
             tree=mutant.tree_digest,
             activation=activation,
             t_manifest=difference.t_first,
@@ -319,10 +346,22 @@ class ExperimentRunner:
             first_change=change,
             first_change_share=share_in_direction(reference, faulty, time, change, end),
             speeds=speeds_after_activation(self.manifest, reference, faulty, activation, end),
+            against_golden=compared.case,
+            golden_hazards=tuple(compared.golden_hazards),
         )
 
-    def _reason_inactive(self, experiment: Experiment, execution: JobResult) -> str:
-        if self.inactivity_check is None:
+    def _detail(
+        self,
+        experiment: Experiment,
+        execution: JobResult,
+        case: AgainstGolden | None,
+        activation: ObservedActivation | None,
+    ) -> str:
+        """Return why a fault was never active, or cannot be judged; else empty."""
+        if case is AgainstGolden.NOT_BEFORE:
+            hazards = describe_golden_hazards(self.goldens.hazards_of(experiment))
+            return f"it was not active before the hazard of the golden run: {hazards}"
+        if activation is not None or self.inactivity_check is None:
             return ""
         scenario = self.scenario_file(experiment.scenario)
         return self.inactivity_check.reason(experiment, scenario, execution.probe_report or {})
@@ -336,7 +375,7 @@ class ExperimentRunner:
         )
         # the number of activations before a crash is reproducible; before a timeout it is not
         activation = activation_of(execution.probe_report or {}) if status is Status.CRASHED else None
-        bare = _record_of_mutant_without_outcome(experiment, status, detail, mutant, activation)
+        bare = record_of_mutant_without_outcome(experiment, status, detail, mutant, activation)
         return replace(bare, error=run_error(execution.exception))
 
 
@@ -352,33 +391,3 @@ def _reason_not_by_fault(t_first: float | None, activation: ObservedActivation |
     if activation is not None:
         when = f"before the fault was first active ({activation.first} s)"
     return f"differs from the golden run at {t_first} s, {when}"
-
-
-def _record_of_mutant_without_outcome(
-    experiment: Experiment,
-    status: Status,
-    detail: str,
-    mutant: Mutant | None,
-    activation: ObservedActivation | None = None,
-) -> Record:
-    bare = record_without_outcome(experiment.id, status, detail)
-    if mutant is not None:
-        bare = replace(bare, tree=mutant.tree_digest, patch=digest(mutant.patch_bytes))
-    return replace(bare, activation=activation)
-
-
-def record_without_outcome(experiment_id: str, status: Status, detail: str) -> Record:
-    """Make the record of an experiment that has a status but no outcome."""
-    return Record(
-        experiment_id=experiment_id,
-        status=status,
-        outcome=None,
-        detail=detail,
-        tree="",
-        activation=None,
-        t_manifest=None,
-        max_dev=(),
-        hazards=(),
-        alerts=(),
-        trace_digest="",
-    )

@@ -1,6 +1,6 @@
 """Runs the items of a campaign in the process that got them: what has no record yet, and its proof."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -36,6 +36,14 @@ class ItemsStart(PickledValue):
     problem: str = ""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ItemEnding:
+    """Why an item fails, if it does, and why its experiments were left out, if all were."""
+
+    problems: Sequence[str] = ()
+    reason_left_out: str = ""
+
+
 class ItemRunner:
     """Runs items of a run folder. `make_worker` makes the worker of this process for the first that must run:
     in a finished run, nothing is written.
@@ -51,11 +59,11 @@ class ItemRunner:
         self._planned = ExperimentsReadOnAccess(folder.path, folder.head.chunks)
         self._proofs_to_decide: list[Experiment] = []  # nothing was forked yet
 
-    def run(self, item: ListedItem) -> list[str]:
-        """Run what has no record; return why the item fails, if it does."""
+    def run(self, item: ListedItem) -> ItemEnding:
+        """Run what has no record; return how the item ends."""
         experiments = {position: self._planned[position] for position in item.positions}
         ended = {finished.experiment.id: finished for finished in self._run_pending(experiments)}
-        problems = []
+        problems, reasons_left_out = list[str](), list[str]()
         for experiment in experiments.values():
             finished = ended.get(experiment.id)
             record = finished.record if finished else self._stored_record_of(experiment)
@@ -64,10 +72,14 @@ class ItemRunner:
             if record.status is Status.HARNESS_ERROR:
                 problems.append(f"{experiment.id}: {record.detail}")
                 continue
+            if record.status is Status.LEFT_OUT:
+                reasons_left_out.append(record.detail)
+                continue
             if experiment.id in self._unproved:
                 problems += self._prove_or_defer(experiment)
             problems += self._unexpected_result(experiment, record, finished)
-        return problems
+        are_all_left_out = len(reasons_left_out) == len(experiments)
+        return ItemEnding(problems=problems, reason_left_out=reasons_left_out[0] if are_all_left_out else "")
 
     def prove_rest(self) -> None:
         """Prove what ran before anything was forked, if anything was since, in any process."""
@@ -104,7 +116,12 @@ class ItemRunner:
     def _stored_record_of(self, experiment: Experiment) -> Record | None:
         """Return the record of an earlier session, if anything depends on it."""
         needs_record = self._expectation_of(experiment) is not None or experiment.id in self._unproved
+        needs_record |= self._folder.golden_run_of(experiment).key in self._left_out_goldens
         return self._stored_records.get(experiment.id) if needs_record else None
+
+    @cached_property
+    def _left_out_goldens(self) -> Collection[str]:
+        return self._folder.left_out_goldens
 
     def _expectation_of(self, experiment: Experiment) -> Expectation | None:
         return self._expectation_by_id.get(experiment.id, self._expectation)

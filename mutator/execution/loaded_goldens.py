@@ -8,12 +8,14 @@ from typing import TypeVar
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.file_change_detection import FileChangeDetector
+from mutator.engines.engine_jobs import GoldenEnd
 from mutator.errors import MutatorError
 from mutator.model import Experiment
-from mutator.outcomes.hazard_and_metric_judgement import load_judged_run, load_manifest_channels
+from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, judge_run, load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
-from mutator.outcomes.trace_and_record_loading import Trace
+from mutator.outcomes.trace_and_record_loading import Trace, load_target_record
 from mutator.preflight.check_run_problems import output_digest_of
+from mutator.store.checks_file import HazardTimes
 from mutator.store.golden_runs import GoldenRun
 from mutator.targets.manifest import TargetManifest
 
@@ -43,9 +45,7 @@ class LoadedGoldens:
         self._sampler_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
             lambda folder: SeriesSampler(manifest, self._trace_of_folder(folder))
         )
-        self._judged_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
-            lambda folder: self._load_unchanged(folder, load_judged_run)[1]
-        )
+        self._judged_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._judge)
 
     def read_and_verify_files_of(self, experiment: Experiment) -> None:
         """Read the golden run's files before they are used. MutatorError if their digest is another."""
@@ -69,14 +69,37 @@ class LoadedGoldens:
             raise changed_file_error(folder)
         return files
 
+    def _judge(self, folder: Path) -> RunJudgement:
+        trace = self._trace_of_folder(folder)
+        record = self._load_unchanged(folder, load_target_record)
+        return judge_run(self._manifest, trace, record, golden=trace)
+
     def golden_key_of(self, experiment: Experiment) -> str:
         return GoldenRun.for_experiment(experiment, several_seeds=self._several_seeds).key
 
     def trace_of(self, experiment: Experiment) -> Trace:
         return self._trace_of_folder(self.folder_of(experiment))
 
-    def has_terminal_hazard(self, experiment: Experiment) -> bool:
-        return self._judged_of_folder(self.folder_of(experiment)).t_end is not None
+    def judgement_of(self, experiment: Experiment) -> RunJudgement:
+        """Return the judgement of the golden run, with the metrics that compare a run with golden, too."""
+        return self._judged_of_folder(self.folder_of(experiment))
+
+    def hazards_of(self, experiment: Experiment) -> HazardTimes:
+        """Return the hazards of the golden run, by time."""
+        hazards = self.judgement_of(experiment).hazards
+        return tuple(sorted(hazards, key=lambda hazard: (hazard[1], hazard[0])))
+
+    def end_of(self, experiment: Experiment) -> GoldenEnd | None:
+        """Return where a terminal hazard ends the golden run; None if none does."""
+        t_end = self.judgement_of(experiment).t_end
+        if t_end is None:
+            return None
+        times = self.trace_of(experiment)[self._manifest.time_channel]
+        return GoldenEnd(rows_before=int((times < t_end).sum()), row_count=len(times))
+
+    @property
+    def step_s(self) -> float:
+        return self._manifest.step_s
 
     def sampler_of(self, experiment: Experiment) -> SeriesSampler:
         return self._sampler_of_folder(self.folder_of(experiment))

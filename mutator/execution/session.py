@@ -41,14 +41,16 @@ from mutator.execution.finished_outcome_cache import (
     remember_finished_run,
 )
 from mutator.execution.session_checks import SessionChecks
+from mutator.execution.session_proof import prove_rest_of_sample, remaining_proof
 from mutator.execution.session_reuse import SessionReuse, count_reused
 from mutator.execution.session_summary import Summary
-from mutator.execution.worker import WorkerAssignment, WorkerStart
+from mutator.execution.worker import Worker, WorkerAssignment, WorkerStart
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Outcome, Record
 from mutator.preflight import equivalence_check
 from mutator.preflight.preflight_checks import checks_and_goldens_exist
 from mutator.results import table_building
+from mutator.results.note_on_golden_hazards import left_out_note_of_records
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experiment
 from mutator.store import file_digests
@@ -139,14 +141,11 @@ class Session:
         copies = self._earlier.since or (self.reuse and self.reuse.searches)
         if pending_chunks and (self.engine != REFERENCE or copies):
             equivalence_check.mark_check_as_needed(self.folder.path)
-        self.proof = equivalence_check.remaining_sampled_experiments(self.folder)
+        self.proof = remaining_proof(self.folder, selected_ids, records)
         if selected_ids is not None:
             pending = sum(len(chunk.pending_positions) for chunk in pending_chunks)
             planned = self.folder.planned_experiment_count
             self._unselected_count = planned - self._finished_count_before - pending
-            self.proof = tuple(
-                sample for sample in self.proof if sample.id in selected_ids or sample.id in records
-            )
         has_checks = checks_and_goldens_exist(self.folder) and not are_verdicts_provisional(self.folder)
         if pending_chunks or self.proof or not has_checks:
             check_requirements(self.manifest)
@@ -154,6 +153,8 @@ class Session:
             self.checks.begin(self.folder, beside_experiments=checks_beside and bool(pending_chunks))
             self.begin_environment(f"{self.worker_prefix}*", packages)
             self.golden_digests = {} if self.checks.beside else golden_digests(self.folder)
+            if self.folder.left_out_goldens:  # which the sample does without
+                self.proof = remaining_proof(self.folder, selected_ids, records)
         self.pending = pending_chunks
         self._records = None if pending_chunks else records
 
@@ -277,6 +278,9 @@ class Session:
         finished_count = len(records) - len(harness_errors)
         results_path = None
         with self._noting_full_disk():
+            if not (was_cut_off or is_provisional):
+                proved = prove_rest_of_sample(self.folder, records, self._make_proving_worker)
+                self.written.add_report(proved)
             self._close_segments()
             is_whole = finished_count == self.folder.planned_experiment_count
             if (tables_of_part or is_whole) and not is_provisional:
@@ -326,7 +330,12 @@ class Session:
             is_provisional=is_provisional,
             left_out=left_out,
             since_note=since_note,
+            golden_hazards_note=left_out_note_of_records(records, self.folder.planned_experiment_count),
         )
+
+    def _make_proving_worker(self) -> Worker:
+        self.golden_digests = golden_digests(self.folder)  # those of late checks, too
+        return Worker(self.inputs, self.worker_assignment("proof"))
 
     def compare_sample(self, records: Mapping[str, Record]) -> equivalence_check.EquivalenceResult | None:
         """Return the state of the equivalence check. What failed it is not stored for other runs."""
@@ -373,6 +382,9 @@ class Session:
             not_forked="" if outcome.proof else self._not_forked,
             elapsed_s=time.monotonic() - self._start_s,
             has_reached_nothing=self._has_reached_nothing(outcome.outcomes),
+            golden_hazards_note=left_out_note_of_records(
+                self.folder.records(), self.folder.planned_experiment_count
+            ),
         )
 
     def _has_reached_nothing(self, outcomes: Counter[str]) -> bool:

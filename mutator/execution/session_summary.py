@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mutator.audit.run_digests_and_seal import Seals
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, EXIT_OK
+from mutator.model import Status
 from mutator.preflight import equivalence_check
 
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
@@ -31,6 +32,8 @@ class Summary:
     elapsed_s: float  #: duration of the session (s)
     #: whether, without a canary, no experiment of the whole plan has reached a hazard
     has_reached_nothing: bool = False
+    #: which experiments were left out because their golden run has a hazard; empty if none was
+    golden_hazards_note: str = ""
     reused: int = 0  #: experiments of this session whose result was copied from an earlier run
     left_out: int = 0  #: experiments that `since` left out: their earlier records stand
     since_note: str = ""  #: what `since` left out, and why others ran; empty without it
@@ -71,9 +74,14 @@ class Summary:
         return str(self.proof) if self.proof else ""
 
     @property
+    def has_left_out_all(self) -> bool:
+        """Whether every experiment was left out, because its golden run has a hazard."""
+        return 0 < self.outcomes[Status.LEFT_OUT] == self.planned
+
+    @property
     def exit_code(self) -> int:
-        """0: success; 1: no hazard was reached, and no canary shows that one can be; 3: harness errors, or
-        experiments left to run; 130: interrupted.
+        """0: success; 1: every experiment was left out, or no hazard was reached, and no canary shows that
+        one can be; 3: harness errors, or experiments left to run; 130: interrupted.
         """
         if self.interrupted:
             return EXIT_INTERRUPTED
@@ -81,4 +89,4 @@ class Summary:
         whole = self.done + self.unselected == self.planned and is_proved
         if not whole or self.problem:
             return EXIT_HARNESS_ERRORS
-        return EXIT_CHECK_FAILED if self.has_reached_nothing else EXIT_OK
+        return EXIT_CHECK_FAILED if self.has_reached_nothing or self.has_left_out_all else EXIT_OK

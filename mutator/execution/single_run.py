@@ -15,11 +15,12 @@ from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.engine_jobs import EngineArguments, Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring, measure_limits
-from mutator.errors import CheckFailed
+from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.experiment_runner import ExperimentRunner, RecordedExperiment
+from mutator.execution.golden_hazards import GoldenHazardRules
 from mutator.execution.inactivity_check import InactivityCheck
 from mutator.execution.loaded_goldens import LoadedGoldens
-from mutator.model import Experiment, Limits, Record, Status
+from mutator.model import Experiment, GoldenClass, Limits, Record, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.preflight.check_run_problems import read_check_run
 from mutator.store import plan_file
@@ -53,7 +54,8 @@ def run_single(
 ) -> SingleRun:
     """Run an experiment; write golden/ (unless given), faulty/ and mutant.patch into the folder `out`.
 
-    Without `limits`, the golden run determines those of the faulty run.
+    Without `limits`, the golden run determines those of the faulty run. It runs also if the golden run has a
+    hazard.
 
     faulty/ is empty if the mutant could not be built. Raises CheckFailed if the golden run fails.
     """
@@ -77,7 +79,15 @@ def run_single(
         )
         check = InactivityCheck(arguments)
         runner = ExperimentRunner(
-            manifest, models, engine, goldens, workspace.scenario, inactivity_check=check
+            manifest,
+            models,
+            engine,
+            goldens,
+            workspace.scenario,
+            golden_hazard_rules=GoldenHazardRules(
+                include=GoldenClass.HAZARD_WITHOUT_FAULT, scale=workspace.scale_of(manifest)
+            ),
+            inactivity_check=check,
         )
         (finished,) = _storing_output(runner.run([experiment]), out)
     return SingleRun(
@@ -107,11 +117,21 @@ def rerun_experiment(
     """Rerun a planned experiment, with output in the folder `out` (default: traces/<id>/ of the run folder).
 
     The second value is True if the record equals the campaign's, or if the campaign has none yet.
+    MutatorError for an experiment that was left out.
     """
     folder = RunFolder.open(run)
     manifest = manifest_of_unchanged_target(workspace, folder)
     full_id = folder.experiment_id_from(experiment_id)
     experiment = next(e for e in plan_file.load_experiments(folder.path) if e.id == full_id)
+    stored = folder.records().get(full_id)
+    if stored is not None and stored.status is Status.LEFT_OUT:
+        raise MutatorError(
+            f"experiment {full_id} was left out: {stored.detail}",
+            where=folder.path,
+            expected="an experiment that ran",
+            remedy=f"run it alone (`mutator try`), or write `include: {GoldenClass.HAZARD_WITHOUT_FAULT}` in "
+            "the campaign",
+        )
     golden = folder.golden_folder_of(experiment)
     single = run_single(
         workspace,
@@ -121,7 +141,7 @@ def rerun_experiment(
         limits=folder.limits,
         golden=golden if golden.is_dir() else None,
     )
-    return single, is_same_record(folder, folder.records().get(full_id), single.record)
+    return single, is_same_record(folder, stored, single.record)
 
 
 def is_same_record(folder: RunFolder, stored: Record | None, rerun_record: Record) -> bool:

@@ -25,7 +25,7 @@ def describe_unexpected_result(
     these further options.
     """
     finished = FinishedExperiment(experiment, record, folder.severity_scale)
-    row = row_of(result_columns_of(folder.head), finished)
+    row = row_of(result_columns_of(folder), finished)
     sentence = ExperimentSentences.of_run(folder.head).sentence(row, experiment.fault)
     words = ["mutator", "show", experiment.id[:_SHOWN_ID_LENGTH], "--run", str(folder.path), "--drive"]
     words += replay_options

@@ -215,6 +215,8 @@ def _bench_values(plan: Plan) -> dict[str, Any]:
     campaign = plan.campaign
     values: dict[str, Any] = {"name": campaign.name, "about": campaign.purpose, "target": campaign.target}
     values |= {"reading": plan.reading, "seed": plan.seed, "after_hazard": campaign.after_hazard.value}
+    if campaign.include is not None:
+        values["include"] = campaign.include.value
     if campaign.canary is not None:
         values["canary"] = asdict(campaign.canary)
     if limits := campaign.yaml_source.data.get("limits"):

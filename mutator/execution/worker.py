@@ -21,9 +21,10 @@ from mutator.execution.experiment_runner import (
     CopiedRun,
     RecordedExperiment,
     find_nothing,
-    record_without_outcome,
 )
 from mutator.execution.golden_facts import GoldenFacts
+from mutator.execution.golden_hazards import GoldenHazardRules
+from mutator.execution.records_without_outcome import record_without_outcome
 from mutator.execution.run_reuse import ReuseAssignment, RunReuse
 from mutator.execution.suspended_workers import on_resume
 from mutator.execution.unaffected_runs import UnaffectedRuns
@@ -106,6 +107,9 @@ class Worker:
             has_seeded_goldens=self.folder.has_seeded_goldens,
             scenario_file=self._scenario_file,
             with_series=bool(self.folder.series_budget_mb),
+            golden_hazard_rules=GoldenHazardRules(
+                include=self.folder.head.include, scale=self.folder.severity_scale
+            ),
             find_copied_run=self._find_copied_run,
             find_proof=self._unaffected.find_for_proof if self._unaffected else find_nothing,
         )
@@ -137,7 +141,7 @@ class Worker:
     def _shared_result(self, experiment: Experiment) -> RecordedExperiment | None:
         """Return what an experiment gives that shares its run with the last one."""
         last = self._last_finished
-        if last is None or last.record.status is Status.HARNESS_ERROR:
+        if last is None or last.record.status in (Status.HARNESS_ERROR, Status.LEFT_OUT):
             return None
         if run_key(self._manifest, last.experiment) != run_key(self._manifest, experiment):
             return None
@@ -210,7 +214,8 @@ class Worker:
         timing = timing_of(finished, self._assignment.worker_name)
         if self._recording and (code := self._recording.code_of(finished)):
             timing["executed"] = self._writer.append_executed_code(code)
-        if self._unaffected and finished.mode is not RunMode.UNAFFECTED:
+        is_left_out = finished.record.status is Status.LEFT_OUT
+        if self._unaffected and not is_left_out and finished.mode is not RunMode.UNAFFECTED:
             timing["affected"] = self._unaffected.reason(finished.experiment)
         self._writer.append(finished.record, timing, patch, finished.series)
         if self._reuse:

@@ -15,6 +15,7 @@ from mutator.execution.experiment_runner import (
     RecordedExperiment,
     find_nothing,
 )
+from mutator.execution.golden_hazards import GoldenHazardRules
 from mutator.execution.inactivity_check import InactivityCheck
 from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.model import Experiment
@@ -38,12 +39,14 @@ class WorkerRunners:
         has_seeded_goldens: bool,
         scenario_file: Callable[[str], Path],
         with_series: bool,
+        golden_hazard_rules: GoldenHazardRules,
         find_copied_run: FindCopiedRun = find_nothing,
         find_proof: FindCopiedRun = find_nothing,
     ) -> None:
         self._arguments, self._manifest = arguments, arguments.manifest
         self._golden_folder_of, self._digest_by_golden_folder = golden_folder_of, digest_by_golden_folder
         self._has_seeded_goldens, self._scenario_file = has_seeded_goldens, scenario_file
+        self._golden_hazard_rules = golden_hazard_rules
         self._runner = self._make_runner(
             make_engine(engine_name, arguments), with_series=with_series, find_copied_run=find_copied_run
         )
@@ -103,6 +106,7 @@ class WorkerRunners:
             engine,
             goldens,
             self._scenario_file,
+            golden_hazard_rules=self._golden_hazard_rules,
             with_series=with_series,
             inactivity_check=InactivityCheck(self._arguments),
             find_copied_run=find_copied_run,

@@ -339,6 +339,7 @@ def _summary_lines(run: FileRun, summary: Summary, title: str) -> list[str]:
         f"{title}{summary.done} of {summary.planned} experiments done, {summary.ran} now",
         summary.reuse_note,
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),
+        summary.golden_hazards_note,
         summary.problem,
         *(f"{name}: {what}" for name, what in summary.harness_errors),
         f"proof: {summary.proof_note}" if summary.proof_note and not missing else "",

@@ -2,7 +2,16 @@
 
 from collections.abc import Iterable, Sequence
 
-from mutator.model import AfterHazard, Experiment, Fault, Hold, ObservedActivation, Outcome, Record
+from mutator.model import (
+    AfterHazard,
+    AgainstGolden,
+    Experiment,
+    Fault,
+    Hold,
+    ObservedActivation,
+    Outcome,
+    Record,
+)
 from mutator.targets.hazard_severity import DELTA_V_NAME, ClassifiedHazard, SeverityScale
 
 EventTimes = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
@@ -25,13 +34,20 @@ def first_events_after(
 
 
 def outcome_of(
-    *, activation: ObservedActivation | None, t_manifest: float | None, hazards: EventTimes
+    *,
+    activation: ObservedActivation | None,
+    t_manifest: float | None,
+    hazards: EventTimes,
+    against_golden: AgainstGolden | None = None,
 ) -> Outcome:
-    """Return the first of not_activated, hazard, sdc and masked that applies.
+    """Return the first of not_judged, not_activated, hazard, sdc and masked that applies.
 
-    `hazards` are those at or after activation. A hazard applies even without an actuator difference, because
-    the fault can act on the world directly.
+    `hazards` are those at or after activation; if the golden run has hazards, only those that the fault
+    added, moved forward or made worse. A hazard applies even without an actuator difference, because the
+    fault can act on the world directly.
     """
+    if against_golden is AgainstGolden.NOT_BEFORE:
+        return Outcome.NOT_JUDGED
     if activation is None:
         return Outcome.NOT_ACTIVATED
     if hazards:

@@ -34,6 +34,8 @@ from mutator.store.checks_file import (
     CHECKS_FILE,
     CHECKS_SCHEMA,
     UNPACKAGED_MODULES_KEY,
+    HazardTimes,
+    golden_hazards_as_json,
     measured_limits_as_json,
     unpackaged_modules_as_json,
 )
@@ -58,6 +60,7 @@ class CheckedGolden:
     results: tuple[CheckResult, ...]
     canary: CheckResult | None = None
     modules_without_package: tuple[str, ...] = ()
+    hazards: HazardTimes = ()
 
     def as_json(self) -> dict[str, Any]:
         values = asdict(self)
@@ -70,7 +73,8 @@ class CheckedGolden:
         results = tuple(CheckResult(**result) for result in values["results"])
         canary = CheckResult(**values["canary"]) if values["canary"] else None
         lists = {name: tuple(values.get(name, ())) for name in ("packages", UNPACKAGED_MODULES_KEY)}
-        return cls(**{**values, **lists, "results": results, "canary": canary})
+        hazards = tuple((name, time) for name, time in values.get("hazards", ()))
+        return cls(**{**values, **lists, "results": results, "canary": canary, "hazards": hazards})
 
 
 @dataclass
@@ -172,6 +176,7 @@ class BenchChecks:
                 cpu_s=first.cpu_s,
                 packages=tuple(loaded_packages(self.manifest, [first])),
                 modules_without_package=unpackaged_modules(self.manifest, [first]),
+                hazards=first.hazards,
                 results=tuple(golden_run_results(runs, golden_run)),
                 canary=canary if golden_run == canary_golden else None,
             )
@@ -256,6 +261,12 @@ class BenchChecks:
             "packages": sorted({name for golden in checked for name in golden.packages}),
             **unpackaged_modules_as_json(
                 name for golden in checked for name in golden.modules_without_package
+            ),
+            **golden_hazards_as_json(
+                {
+                    golden_run.key: golden.hazards
+                    for golden_run, golden in zip(golden_runs, checked, strict=True)
+                }
             ),
             "run_cpu_s": sum(cpu_s) / len(cpu_s),
             CHECKED_GOLDENS_KEY: {

@@ -5,12 +5,14 @@ harmless.
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
+from mutator.campaigns.campaign_files import Campaign
 from mutator.engines.engine_jobs import Job
 from mutator.errors import MutatorError
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Experiment, Fault, fault_label
 from mutator.mutants.mutant_building import build
 from mutator.preflight.check_run_problems import CheckRun
+from mutator.store.checks_file import HazardTimes, describe_golden_hazards
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -24,6 +26,19 @@ class CanaryVerdict:
     success: str = ""
     problem: str = ""
     remedy: str = ""
+
+
+def golden_hazard_error(campaign: Campaign, golden_key: str, hazards: HazardTimes) -> MutatorError:
+    """Return the error of a canary whose golden run has a hazard, for the caller to raise."""
+    got = (
+        f"the canary's golden run {golden_key} has a hazard without any fault, "
+        f"{describe_golden_hazards(hazards)}"
+    )
+    expected = "a scenario in which only the fault causes a hazard"
+    remedy = "name another scenario for `canary`"
+    if campaign.is_bench:  # its file was written for the caller
+        return MutatorError(got, argument="canary", expected=expected, remedy=remedy)
+    return campaign.error(("canary", "scenario"), got, expected=expected, remedy=remedy)
 
 
 def canary_with_other_values(

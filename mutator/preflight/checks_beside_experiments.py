@@ -125,6 +125,8 @@ class ChecksBesideExperiments:
                 continue
             self._runs[name] = result
             if self._runner.runs_needed_of(name[1]) <= self._runs.keys():
+                if name[1] == self._runner.canary_golden_run and self._runs[GOLDEN, name[1]].hazards:
+                    self.has_failed = True
                 if self._is_sound(name[1]):
                     run = passed[name[1].key] = self._runs[GOLDEN, name[1]]
                     self._place(name[1], run.output_digest)

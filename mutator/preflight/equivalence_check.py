@@ -124,12 +124,28 @@ def choose_sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experim
 
 def _sample_ids_of_plan(folder: RunFolder) -> set[str]:
     """Ids of a plan's sample. For several seeds, each seed after the first adds one experiment in a
-    hundred.
+    hundred. Experiments that are left out are not in it; instead of them, others are.
+
+    Before the checks have passed, nobody knows which these are. What was in the sample by then stays in it,
+    because it may have been proved.
     """
+    left_out = folder.left_out_goldens
     if folder.is_bench:
-        sample = _cached_bench_sample(folder.path, folder.head.plan)
+        sample = _cached_bench_sample(folder.path, folder.head.plan, left_out)
         return {*sample.drawn, *sample.chosen}
-    return set(_cached_sample_ids(folder.path, folder.head.plan, len(folder.seeds)))
+    ids = set(_cached_sample_ids(folder.path, folder.head.plan, len(folder.seeds), frozenset()))
+    if left_out:
+        ids &= {experiment.id for experiment in _experiments_to_run(folder, left_out)}
+        ids.update(_cached_sample_ids(folder.path, folder.head.plan, len(folder.seeds), left_out))
+    return ids
+
+
+def _experiments_to_run(folder: RunFolder, left_out_goldens: Collection[str]) -> list[Experiment]:
+    return [
+        experiment
+        for experiment in plan_file.iterate_experiments(folder.path)
+        if folder.golden_run_of(experiment).key not in left_out_goldens
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,18 +175,21 @@ def sample_of_bench(experiments: Iterable[Experiment], seed: int) -> BenchSample
 
 
 @lru_cache(maxsize=4)
-def _cached_bench_sample(run: Path, plan: str) -> BenchSample:
-    head = RunFolder.open_unverified(run).head
-    return sample_of_bench(plan_file.iterate_experiments(run), head.seed)
+def _cached_bench_sample(run: Path, plan: str, left_out_goldens: frozenset[str]) -> BenchSample:
+    folder = RunFolder.open_unverified(run)
+    return sample_of_bench(_experiments_to_run(folder, left_out_goldens), folder.head.seed)
 
 
 @lru_cache(maxsize=4)  # a session asks several times
-def _cached_sample_ids(run: Path, plan: str, seed_count: int) -> tuple[str, ...]:
-    head = RunFolder.open_unverified(run).head
-    if seed_count == 1 or head.experiments < SMALL_PLAN_SIZE:
-        return tuple(e.id for e in choose_sample(plan_file.load_experiments(run), head.seed))
+def _cached_sample_ids(
+    run: Path, plan: str, seed_count: int, left_out_goldens: frozenset[str]
+) -> tuple[str, ...]:
+    folder = RunFolder.open_unverified(run)
+    to_run = _experiments_to_run(folder, left_out_goldens)
+    if seed_count == 1 or len(to_run) < SMALL_PLAN_SIZE:
+        return tuple(e.id for e in choose_sample(to_run, folder.head.seed))
     ids: list[str] = []
-    for seed, group in groupby(plan_file.iterate_experiments(run), key=lambda experiment: experiment.seed):
+    for seed, group in groupby(to_run, key=lambda experiment: experiment.seed):
         experiments = tuple(group)
         sampled_experiments = (
             draw_balanced(experiments, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_EXPERIMENT), seed)
@@ -203,7 +222,9 @@ def reason_check_not_needed(folder: RunFolder) -> str | None:
         if was_forked(timing):
             return None
         reasons[str(timing.get("why", ""))] += 1
-    return next((why for why, _ in reasons.most_common() if why), "the reference engine ran them all")
+    has_run = any(timing.get("engine") for timing in timings.values())
+    otherwise = "the reference engine ran them all" if has_run else "none of them ran"
+    return next((why for why, _ in reasons.most_common() if why), otherwise)
 
 
 def was_forked(timing: Mapping[str, object]) -> bool:
@@ -266,7 +287,7 @@ def compare_sample(folder: RunFolder, records: Mapping[str, Record]) -> Equivale
     sample_ids, chosen = set(sample_ids_in_folder(folder)), frozenset[str]()
     same_ids &= sample_ids
     if folder.is_bench:
-        chosen = _cached_bench_sample(folder.path, folder.head.plan).chosen
+        chosen = _cached_bench_sample(folder.path, folder.head.plan, folder.left_out_goldens).chosen
     same_chosen = len(chosen & same_ids)
     return EquivalenceResult(
         sampled=len(sample_ids) - len(chosen),

@@ -51,7 +51,7 @@ class CheckRunner:
     campaign: Campaign
     golden_runs: Sequence[GoldenRun]
     seed: int  # of golden runs whose key has none
-    canary_experiment: Experiment | None
+    canary_experiment: Experiment | None  # MutatorError if its golden run has a hazard
     scratch_folder: Path
     pending_folder: Path
     observation_store: ObservationStore | None = (
@@ -138,8 +138,25 @@ class CheckRunner:
     def _judge_canary_after_goldens(
         self, engine: ReferenceEngine, futures: Mapping[tuple[str, Any], Future[CheckRun]]
     ) -> canary_check.CanaryVerdict | None:
-        goldens = [future.result() for name, future in futures.items() if name[0] == GOLDEN]
-        return self.judge_canary(engine, self.measure_limits(goldens))
+        goldens = {name: future.result() for name, future in futures.items() if name[0] == GOLDEN}
+        self.check_golden_run_of_canary(goldens)
+        return self.judge_canary(engine, self.measure_limits(goldens.values()))
+
+    def check_golden_run_of_canary(self, runs: CheckRunByName) -> None:
+        """Raise MutatorError if the golden run of the canary is among `runs` and has a hazard: its canary
+        would prove nothing.
+        """
+        canary, golden_run = self.canary_experiment, self.canary_golden_run
+        run = runs.get((GOLDEN, golden_run))
+        if canary is not None and golden_run is not None and run is not None and run.hazards:
+            raise canary_check.golden_hazard_error(self.campaign, golden_run.key, run.hazards)
+
+    @cached_property
+    def canary_golden_run(self) -> GoldenRun | None:
+        """The golden run of the canary; None without a canary."""
+        canary = self.canary_experiment
+        several_seeds = any(golden_run.seed is not None for golden_run in self.golden_runs)
+        return GoldenRun.for_experiment(canary, several_seeds=several_seeds) if canary else None
 
     def judge_canary(self, engine: ReferenceEngine, limits: Limits) -> canary_check.CanaryVerdict | None:
         """Run the canary with the limits of faulty runs; None without one."""

@@ -19,7 +19,7 @@ from mutator.campaigns.shared_runs import scenarios_sharing_runs
 from mutator.engines.observation_store import ObservationStore
 from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.model import Fault, Limits
+from mutator.model import Fault, GoldenClass, Limits
 from mutator.mutants.mutant_building import build
 from mutator.preflight import preflight_cache, unreached_triggers
 from mutator.preflight.canary_check import CanaryVerdict
@@ -47,6 +47,8 @@ from mutator.store.checks_file import (
     CHECKS_FILE,
     CHECKS_SCHEMA,
     MEASURED_LIMITS_KEY,
+    describe_golden_hazards,
+    golden_hazards_as_json,
     measured_limits_as_json,
     unpackaged_modules_as_json,
 )
@@ -209,7 +211,10 @@ class PreflightChecks:
         runs: CheckRunByName,
         canary_verdict: CanaryVerdict | None,
     ) -> Sequence[CheckResult]:
-        """Judge the runs, and store results and golden runs in the run folder."""
+        """Judge the runs, and store results and golden runs in the run folder. MutatorError for a canary
+        whose golden run has a hazard.
+        """
+        check_runner.check_golden_run_of_canary(runs)
         results = [anchors, *self._judge_goldens(runs)]
         if canary_verdict:
             results.append(build_check_result("canary", canary_verdict.problem, canary_verdict.success))
@@ -232,6 +237,7 @@ class PreflightChecks:
             **self._verdicts_as_json(runs),
             "packages": loaded_packages(self.manifest, golden_runs),
             **unpackaged_modules_as_json(unpackaged_modules(self.manifest, golden_runs)),
+            **golden_hazards_as_json({key.key: runs[GOLDEN, key].hazards for key in self.golden_runs}),
             "run_cpu_s": sum(run.cpu_s for run in golden_runs) / len(golden_runs),
             **measured_limits_as_json(check_runner.measure_limits(golden_runs)),
         }
@@ -364,8 +370,10 @@ class PreflightChecks:
 def golden_run_results(runs: CheckRunByName, key: GoldenRun) -> Iterator[CheckResult]:
     """Judge the two golden runs and the null mutant of a golden run."""
     first, again, null = (runs[name, key] for name in (GOLDEN, GOLDEN_AGAIN, NULL_MUTANT))
-    detail = golden_pair_problem(first, again)
-    yield build_check_result(f"golden {key.key}", detail, "the same bytes twice")
+    detail, success = golden_pair_problem(first, again), "the same bytes twice"
+    if first.hazards:
+        success += f"; {GoldenClass.HAZARD_WITHOUT_FAULT}: {describe_golden_hazards(first.hazards)}"
+    yield build_check_result(f"golden {key.key}", detail, success)
     if not first.problem:
         detail = null_mutant_problem(first, null)
         yield build_check_result(f"null mutant {key.key}", detail, "the same bytes as golden")

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from mutator._common.table_rendering import TextTable
 from mutator.reference.yaml_key_tables import generated_page_head
+from mutator.results.columns_of_golden_hazards import golden_class_columns
 from mutator.results.csv_and_parquet_writers import ARROW_TYPE_BY_COLUMN_TYPE, TableColumn
 from mutator.results.plan_columns import PLAN_COLUMN_NAMES
 from mutator.results.propagation_columns import PROPAGATION_COLUMNS as PROPAGATION
@@ -55,7 +56,8 @@ def _result_columns_section(manifest: TargetManifest) -> Iterator[str]:
     compared = [channel.name for channel in manifest.compared_channels]
     severity = severity_and_time_columns(has_classes=manifest.severity is not None)
     columns = (manifest.hazard_names, compared, metric_facts(manifest), severity)
-    yield from _columns_table(result_columns(*columns, paths=True, speed=True))
+    golden_classes = golden_class_columns((), several_seeds=False)
+    yield from _columns_table(result_columns(*columns, paths=True, speed=True, golden_classes=golden_classes))
 
 
 def _columns_table(columns: Iterable[TableColumn]) -> Iterator[str]:

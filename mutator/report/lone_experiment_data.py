@@ -19,7 +19,7 @@ from mutator.results.table_columns import deviation_column_by_channel, result_co
 from mutator.results.table_reader import frame_of_finished
 from mutator.review.patch_shapes import shapes_of_patches
 from mutator.store.embedded_series import EmbeddedSeries
-from mutator.store.run_head import RunHead
+from mutator.store.run_folder import RunFolder
 from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.overhead_view_json import scene_as_json
@@ -45,10 +45,11 @@ class ViewedTarget:
     scene: dict[str, Any] | None
 
     @classmethod
-    def of_run(cls, head: RunHead, manifest: TargetManifest | None) -> "ViewedTarget":
+    def of_run(cls, folder: RunFolder, manifest: TargetManifest | None) -> "ViewedTarget":
         """Return what a run stores about its target; `manifest` has only the scene of the replay."""
+        head = folder.head
         return cls(
-            columns=result_columns_of(head),
+            columns=result_columns_of(folder),
             sentences=ExperimentSentences.of_run(head),
             hazards=head.about_hazards,
             hazard_names=head.hazards,

@@ -32,6 +32,11 @@ _ENDING_TERMS = {
     "crashed, timeout": "the fault crashed the program, or prevented it from finishing in time",
     "harness error, invalid mutant": "the experiment says nothing about the fault, so no share includes it",
 }
+_GOLDEN_HAZARD_TERMS = {
+    "left out": "the golden run has a hazard without any fault, so the experiment did not run",
+    "not judged": "the golden run has a hazard, and the fault was not active before it",
+    "hazard free, hazard without fault": "whether the golden run ends well",
+}
 _ALERT_TERMS = {
     "silent hazard": "a hazard with no alert before it: either no alert at all, or only a later one",
     "hazard, no alert": "a silent hazard with no alert at all, not even a later one",
@@ -49,6 +54,7 @@ def glossary_of(run: ReportedRun) -> Glossary:
     head = run.folder.head
     sections = {
         "How an experiment ends": _ENDING_TERMS,
+        "Golden runs with a hazard": _GOLDEN_HAZARD_TERMS if run.folder.golden_hazards else {},
         "What is counted": _COUNTING_TERMS,
         "Alerts": _ALERT_TERMS if run.folder.has_alerts else {},
         "Hazards": {hazard.name: hazard.about for hazard in head.about_hazards if hazard.about},
@@ -69,7 +75,9 @@ def code_meanings_by_column(run: ReportedRun) -> Glossary:
         for name, of in ((name, name.partition("/")[2]) for name in sorted(drawn))
     }
     endings = {
-        name.replace(" ", "_"): about for names, about in _ENDING_TERMS.items() for name in names.split(", ")
+        name.replace(" ", "_"): about
+        for names, about in (_ENDING_TERMS | _GOLDEN_HAZARD_TERMS).items()
+        for name in names.split(", ")
     }
     return {
         "scenario": glossary.get("Scenarios", {}),

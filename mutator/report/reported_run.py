@@ -91,7 +91,8 @@ class ReportedRun:
     @property
     def ran_count(self) -> int:
         """The number of planned experiments that ran."""
-        return int((self.results["status"] != Status.HARNESS_ERROR.value).sum())
+        not_run = (Status.HARNESS_ERROR.value, Status.LEFT_OUT.value)
+        return int((~self.results["status"].isin(not_run)).sum())
 
     def fault_free_runs(self) -> tuple[FaultFreeRun, ...]:
         """Return the alerts, hazards and ranges of the golden runs; empty if these cannot be read."""

@@ -18,7 +18,8 @@ from mutator._common.phrase_texts import (
     measured_time_text,
     planned_number_text,
 )
-from mutator.model import Fault, Hold, Outcome, Status
+from mutator.model import AgainstGolden, Fault, Hold, Outcome, Status
+from mutator.results.columns_of_golden_hazards import AGAINST_GOLDEN
 from mutator.results.fault_phrases import describe_fault
 from mutator.targets.hazard_severity import SeverityScale
 from mutator.targets.manifest import TargetManifest
@@ -53,6 +54,15 @@ _SENTENCE_BY_FAILED_STATUS = {
     Status.TIMEOUT: "The run was stopped at a limit",
     Status.INVALID_MUTANT: "The mutant cannot run",
     Status.HARNESS_ERROR: "The harness failed, so nothing is known about the fault",
+    Status.LEFT_OUT: "It was left out",
+}
+_SENTENCE_BY_GOLDEN_CASE = {
+    AgainstGolden.ANOTHER: "The golden run has a hazard, too, but another one.",
+    AgainstGolden.EARLIER: "The golden run has a hazard, too, but later.",
+    AgainstGolden.WORSE: "The golden run has a hazard, too, but a milder one.",
+    AgainstGolden.MISSING: "A hazard of the golden run does not come.",
+    AgainstGolden.LATER: "The hazard of the golden run comes later.",
+    AgainstGolden.SAME: "The hazard of the golden run comes as without the fault.",
 }
 
 
@@ -107,8 +117,12 @@ class ExperimentSentences:
             parts = [injected, _failure_sentence(status, row)]
         elif row["outcome"] == Outcome.NOT_ACTIVATED:
             parts = [injected, _why_not_active(row)]
+        elif row["outcome"] == Outcome.NOT_JUDGED:
+            parts = [injected, f"It cannot be judged: {row.get('detail')}."]
         else:
-            parts = [injected, self._effect(row), *self._consequences(row)]
+            golden_case = row.get(AGAINST_GOLDEN) or ""
+            against_golden = _SENTENCE_BY_GOLDEN_CASE[AgainstGolden(golden_case)] if golden_case else ""
+            parts = [injected, self._effect(row), against_golden, *self._consequences(row)]
         return " ".join(filter(None, parts))
 
     def _fault_sentence(self, fault: Fault, row: ResultCells) -> str:
@@ -161,7 +175,7 @@ class ExperimentSentences:
             before = time
         text = _as_sentence(_joined_clauses(list(filter(None, clauses))))
         if not has_hazard:
-            return f"{text} No hazard follows.".strip()
+            return f"{text} {_no_hazard(row)}".strip()
         severity_class = row.get("severity") or ""
         if not severity_class:
             return text
@@ -272,7 +286,11 @@ def _why_not_active(row: ResultCells) -> str:
 
 def _where_stopped(row: ResultCells) -> str:
     places = str(row.get("stopped_at") or "").replace(";", " and ")
-    return f"It changes no actuator{f': it stops at {places}' if places else ''}. No hazard follows."
+    return f"It changes no actuator{f': it stops at {places}' if places else ''}. {_no_hazard(row)}".strip()
+
+
+def _no_hazard(row: ResultCells) -> str:
+    return "" if row.get(AGAINST_GOLDEN) else "No hazard follows."
 
 
 def _changed_only_after_hazard(row: ResultCells, hazards: Sequence[tuple[HazardFacts, float]]) -> bool:

@@ -1,6 +1,7 @@
 """Counts activated, manifested and hazardous faults in the results table.
 
-`frame` comes from `Results.frame`. Harness errors and invalid mutants are counted only as such.
+`frame` comes from `Results.frame`. Endings that say nothing about a fault (`UNUSABLE_ENDINGS`) are
+counted only as such.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,8 @@ from mutator.results.table_columns import hazard_names_of_frame
 if TYPE_CHECKING:
     import pandas as pd
 
-UNUSABLE_STATUSES = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
+# outcomes and statuses of experiments that say nothing about their fault
+UNUSABLE_ENDINGS = (Status.HARNESS_ERROR, Status.INVALID_MUTANT, Status.LEFT_OUT, Outcome.NOT_JUDGED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +34,13 @@ class GroupCount:
     crashed: int
     timeout: int
     unusable: int
+
+
+def are_usable(frame: "pd.DataFrame") -> "pd.Series[bool]":
+    """Whether each row says something about its fault."""
+    unusable = [ending.value for ending in UNUSABLE_ENDINGS]
+    columns = [name for name in ("status", "outcome") if name in frame]
+    return ~frame[columns].isin(unusable).any(axis=1)
 
 
 def outcome_or_status_of_rows(frame: "pd.DataFrame") -> "pd.Series[str]":
@@ -95,7 +104,7 @@ def count_outcomes_by_group(frame: "pd.DataFrame", groups: "pd.Series[str]") -> 
     import pandas as pd
 
     hazards = checked_hazard_names(frame)
-    usable = ~frame["status"].isin([status.value for status in UNUSABLE_STATUSES])
+    usable = are_usable(frame)
     occurred = first_hazard_times(frame).notna()
     any_hazard, alert = occurred.any(axis=1), frame["alerts"] != ""
     flags = {

@@ -6,9 +6,10 @@ from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Fault, Outcome, Status, Value, fault_label
+from mutator.results.columns_of_golden_hazards import GOLDEN_CLASS
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.outcome_counting import (
-    UNUSABLE_STATUSES,
+    UNUSABLE_ENDINGS,
     fault_types_of,
     first_hazard_times,
     hazard_margins,
@@ -49,6 +50,7 @@ class ResultRow:
     delta_v: float | None = None  # delta-v of that contact in m/s
     t_end: float | None = None  # when a terminal hazard or a lost value ended the drive
     margins: tuple[tuple[str, float], ...] = ()  # by hazard: those that occurred or, if none did, all
+    golden_class: str = ""  # class of the golden run; '' if all of the run are hazard-free
     sentence: str = ""  # what happened, in words; '' if the phrases are unknown
 
     @property
@@ -58,7 +60,7 @@ class ResultRow:
 
     @property
     def usable(self) -> bool:
-        return self.status not in UNUSABLE_STATUSES
+        return self.status not in UNUSABLE_ENDINGS and self.outcome not in UNUSABLE_ENDINGS
 
     @property
     def summary(self) -> str:
@@ -133,5 +135,6 @@ def _build_row(
         delta_v=cells.get(DELTA_V_NAME),
         t_end=cells.get(DRIVE_END_COLUMN),
         margins=margins,
+        golden_class=cells.get(GOLDEN_CLASS, ""),
         sentence=sentences.sentence(cells, fault) if sentences and fault else "",
     )

@@ -78,7 +78,7 @@ def build_tables(run: Path) -> Path:
 
 def renamed_columns_of(folder: RunFolder) -> str:
     """Return the columns of results.csv with a name of another version of mutator; '' if there are none."""
-    names = [column.name for column in result_columns_of(folder.head)]
+    names = [column.name for column in result_columns_of(folder)]
     return renamed_columns_in(path_below(folder.path, CSV_FILE), names)
 
 
@@ -100,7 +100,7 @@ def _write_result_tables(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     records, planned, columns = (
         folder.records(),
         PlannedExperiments(folder.path),
-        result_columns_of(folder.head),
+        result_columns_of(folder),
     )
     scale, fault_paths = folder.severity_scale, fault_paths_of(folder)
 
@@ -156,7 +156,7 @@ def _inputs_digest(folder: RunFolder) -> str:
     head_facts = (head.hazards, head.compared, head.metrics, head.severity, head.channels, head.structure)
     columns = [
         (column.name, column.type)
-        for column in (*result_columns_of(head), *propagation_columns.PROPAGATION_COLUMNS, *TIMING_COLUMNS)
+        for column in (*result_columns_of(folder), *propagation_columns.PROPAGATION_COLUMNS, *TIMING_COLUMNS)
     ]
     return digest([STAMP_SCHEMA, VERSION, *head_facts, columns, input_digests])
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
 from mutator.outcomes.verdict_rules import reaction_time
+from mutator.results.columns_of_golden_hazards import AGAINST_GOLDEN, GOLDEN_CLASS, golden_class_columns
 from mutator.results.csv_and_parquet_writers import TableColumn
 from mutator.results.finished_experiments_and_columns import FinishedExperiment, ResultColumn, rounded_time
 from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, HOLD_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
@@ -18,13 +19,12 @@ from mutator.results.severity_and_sentence_columns import (
     SPEED_COLUMNS,
     severity_and_time_columns,
 )
+from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_target_facts import DRIVE_END_COLUMN, MetricFacts
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from mutator.store.run_head import RunHead
 
 UNIT_OF_CHANNEL = "as its channel"  # a unit
 
@@ -118,7 +118,7 @@ DETAIL_COLUMN = ResultColumn(
     "detail",
     "text",
     "",
-    "why the status is not `ok`, or why the fault was never active",
+    "why the status is not `ok`, why the fault was never active, or why it cannot be judged",
     lambda f: f.record.detail or None,
 )
 TIMING_COLUMNS = (
@@ -151,11 +151,12 @@ def result_columns(
     *,
     paths: bool = False,
     speed: bool = False,
+    golden_classes: Sequence[ResultColumn] = (),
 ) -> tuple[PlanColumn | ResultColumn, ...]:
     """Return the columns of results.csv, in order.
 
-    `severity` is from `severity_columns`. `paths` adds the columns of the fault's path, `speed` those of the
-    car's speed.
+    `severity` is from `severity_columns`, `golden_classes` from `golden_class_columns`. `paths` adds the
+    columns of the fault's path, `speed` those of the car's speed.
     """
     ends = DRIVE_END_COLUMN in (metric.name for metric in metrics)
     return (
@@ -176,16 +177,26 @@ def result_columns(
         *HOLD_COLUMNS,
         *FIRST_CHANGE_COLUMNS,
         *(SPEED_COLUMNS if speed else ()),
+        *golden_classes,
         DETAIL_COLUMN,
     )
 
 
-def result_columns_of(head: "RunHead") -> tuple[PlanColumn | ResultColumn, ...]:
+def result_columns_of(folder: RunFolder) -> tuple[PlanColumn | ResultColumn, ...]:
     """Return the columns of a run's results.csv, in order."""
+    head, golden_hazards = folder.head, folder.golden_hazards
     paths = any(channel.component for channel in head.channels)
     severity = severity_and_time_columns(has_classes=head.severity is not None)
     return result_columns(
-        head.hazards, head.compared, head.metrics, severity, paths=paths, speed=bool(head.speed)
+        head.hazards,
+        head.compared,
+        head.metrics,
+        severity,
+        paths=paths,
+        speed=bool(head.speed),
+        golden_classes=golden_class_columns(golden_hazards, several_seeds=folder.has_seeded_goldens)
+        if golden_hazards
+        else (),
     )
 
 
@@ -300,6 +311,7 @@ def check_column_names(manifest: TargetManifest) -> None:
         column.name for column in result_columns((), compared, paths=True, speed=bool(manifest.speed))
     }
     used_names |= {column.name for column in severity_and_time_columns(has_classes=True)}
+    used_names |= {GOLDEN_CLASS, AGAINST_GOLDEN}
     used_names |= {
         *DERIVED_COLUMN_NAMES,
         DRIVE_END_COLUMN,

@@ -101,9 +101,9 @@ class Results:
         """Return a frame with the types of results.parquet, of all columns or only those named. Without a
         value, texts are '' and numbers NaN. `attrs["hazards"]` are the target's hazards.
         """
-        data, head = self.parquet(), load_head(self.run)
-        columns = [column for column in result_columns_of(head) if not names or column.name in names]
-        return typed_frame(self._load_checked_columns(data, columns), head.hazards)
+        data, folder = self.parquet(), RunFolder(self.run)
+        columns = [column for column in result_columns_of(folder) if not names or column.name in names]
+        return typed_frame(self._load_checked_columns(data, columns), folder.head.hazards)
 
     def indexed_frame(self) -> "pd.DataFrame":
         """Return a frame of all columns for notebooks, indexed by experiment id.
@@ -115,8 +115,9 @@ class Results:
         """
         import pandas as pd
 
-        data, head = self.parquet(), load_head(self.run)
-        columns, hazards = result_columns_of(head), [name.lower() for name in head.hazards]
+        data, folder = self.parquet(), RunFolder(self.run)
+        head = folder.head
+        columns, hazards = result_columns_of(folder), [name.lower() for name in head.hazards]
         frame: pd.DataFrame = _to_pandas(
             _without_dictionaries(self._load_checked_columns(data, columns))
         ).set_index("experiment_id")
@@ -128,7 +129,8 @@ class Results:
         for name, order in _ORDERED_VALUES_BY_COLUMN.items():
             frame[name] = pd.Categorical(frame[name], categories=order, ordered=True)
         any_hazard = frame[hazards].any(axis=1).astype("boolean")
-        frame["hazard"] = any_hazard.mask(frame["status"] != Status.OK.value)
+        says_nothing = (frame["status"] != Status.OK.value) | (frame["outcome"] == Outcome.NOT_JUDGED.value)
+        frame["hazard"] = any_hazard.mask(says_nothing)
         frame["t_hazard"] = frame[[f"t_{name}" for name in hazards]].min(axis=1).astype(float)
         numbers = {
             column.name: column.unit or "-" for column in columns if column.type in ("count", "number")
@@ -199,7 +201,7 @@ def frame_of_experiments(folder: RunFolder, experiments: Iterable[Experiment]) -
         for experiment in experiments
         if experiment.id in records
     )
-    return frame_of_finished(result_columns_of(folder.head), finished, folder.head.hazards)
+    return frame_of_finished(result_columns_of(folder), finished, folder.head.hazards)
 
 
 def frame_of_finished(

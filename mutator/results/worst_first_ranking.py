@@ -23,8 +23,10 @@ _ENDINGS_WORST_FIRST = (  # worst first
     Outcome.SDC.value,
     Outcome.MASKED.value,
     Outcome.NOT_ACTIVATED.value,
+    Outcome.NOT_JUDGED.value,
     Status.INVALID_MUTANT.value,
     Status.HARNESS_ERROR.value,
+    Status.LEFT_OUT.value,
 )
 
 

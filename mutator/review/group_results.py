@@ -8,7 +8,7 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from mutator.model import Fault, Outcome, Status
-from mutator.results.outcome_counting import UNUSABLE_STATUSES, outcome_or_status_of_rows
+from mutator.results.outcome_counting import UNUSABLE_ENDINGS, outcome_or_status_of_rows
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_ranks
@@ -95,7 +95,7 @@ def _build_results(
     for row in rows:
         by_ending.setdefault(ending_by_row[row], []).append(row)
     usable = {
-        name: ending_rows for name, ending_rows in by_ending.items() if name not in UNUSABLE_STATUSES
+        name: ending_rows for name, ending_rows in by_ending.items() if name not in UNUSABLE_ENDINGS
     } or by_ending
     most = max(usable.values(), key=len)
     order = [*Outcome, *Status]

@@ -86,7 +86,7 @@ class WatchPages:
         patch = folder.patches.read_patch(name) if finished.record.patch else None
         series = unpacked_series(folder.path, name)
         reason = "The channels of this experiment can be read when the run is finished."
-        target = ViewedTarget.of_run(folder.head, self._manifest(folder.head.target))
+        target = ViewedTarget.of_run(folder, self._manifest(folder.head.target))
         facts = {"finished": folder.is_finished, "report": f"{report_address(key)}#e={name}"}
         return JSONResponse(facts | experiment_view_data(target, finished, patch, series, reason))
 

@@ -60,7 +60,7 @@ class WatchedRun:
         self._tail = LineTail(folder.path, RECORDS_FOLDER)
         self._planned = PlannedExperiments(folder.path)
         self._sentences = ExperimentSentences.of_run(folder.head)
-        self._columns = result_columns_of(folder.head)
+        self._columns = result_columns_of(folder)
         self._counts = _RunCounts(hazards=Counter(dict.fromkeys(folder.head.hazards, 0)))
         self._finished_ids: set[str] = set()
         self._harness_error_ids: set[str] = set()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator.results.outcome_counting import UNUSABLE_STATUSES
+from mutator.results.outcome_counting import are_usable
 from mutator.results.table_columns import hazard_names_of_frame
 from mutator.results.table_reader import Results
 
@@ -21,16 +21,16 @@ def load_usable_results(results: Path) -> pd.DataFrame:
     """Load the usable experiments of a run folder, in order, given its results.csv. MutatorError if the
     results.parquet next to it is invalid.
 
-    Harness errors and invalid mutants are left out; crashes and timeouts are kept.
+    Endings that say nothing about a fault (`UNUSABLE_ENDINGS`) are left out; crashes and timeouts are kept.
     """
     return prepare_results(Results(results.parent).frame())
 
 
 def prepare_results(frame: pd.DataFrame) -> pd.DataFrame:
     """Select the usable experiments of a frame from `Results.frame`, and add the derived columns."""
-    unusable = frame["status"].isin([str(status) for status in UNUSABLE_STATUSES])
-    if unusable.any():
-        frame = frame[~unusable]
+    usable = are_usable(frame)
+    if not usable.all():
+        frame = frame[usable]
     frame = frame.reset_index(drop=True)
     frame["kind"] = frame["module"] + "/" + frame["fault_type"]
     frame["row"] = frame["trigger"].str.removeprefix(_RANDOM_PREFIX)

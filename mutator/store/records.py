@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from mutator._common.confined_files import path_below
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import ObservedActivation, Outcome, Record, RunError, Status
+from mutator.model import AgainstGolden, ObservedActivation, Outcome, Record, RunError, Status
 from mutator.store.indexed_lines import IndexedLine, IndexedLines
 from mutator.store.timings import TIMINGS_FOLDER, TIMINGS_SCHEMA
 
@@ -22,11 +22,16 @@ LINE_SCHEMA_BY_FOLDER = {
 }
 _RECORD_FIELDS = tuple(field.name for field in fields(Record))
 _DATACLASS_FIELDS = ("activation", "error")  # fields that contain dataclasses
+# left out while they have no value, which is so unless the golden run has a hazard
+_OMITTED_FIELDS = ("against_golden", "golden_hazards")
 
 
 def record_as_json(record: Record) -> dict[str, Any]:
     """Convert a record like `asdict`, but without copying every tuple."""
     line = {name: getattr(record, name) for name in _RECORD_FIELDS}
+    for name in _OMITTED_FIELDS:
+        if not line[name]:
+            del line[name]
     return line | {name: asdict(line[name]) for name in _DATACLASS_FIELDS if line[name] is not None}
 
 
@@ -53,6 +58,8 @@ def record_from_json(data: Mapping[str, Any]) -> Record:
         first_change=tuple(data["first_change"]) if data.get("first_change") else None,
         first_change_share=data.get("first_change_share"),
         speeds=_name_value_pairs(data.get("speeds", [])),
+        against_golden=AgainstGolden(data["against_golden"]) if data.get("against_golden") else None,
+        golden_hazards=_name_value_pairs(data.get("golden_hazards", [])),
     )
 
 

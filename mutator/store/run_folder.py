@@ -21,7 +21,7 @@ from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import file_digests, integrity, plan_file
 from mutator.store.allowed_contents import TRACES_FOLDER
 from mutator.store.appended_files import unfinished_growth_problems
-from mutator.store.checks_file import limits_of_run
+from mutator.store.checks_file import HazardTimes, golden_hazards_of_run, limits_of_run
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.packed_patches import PatchFolder
 from mutator.store.plain_contents_check import check_plain_contents
@@ -149,6 +149,16 @@ class RunFolder:
     def limits(self) -> Limits:
         """The limits of faulty runs: the campaign's, or those that the checks of this run measured."""
         return limits_of_run(self.path, self.head.limits)
+
+    @property
+    def golden_hazards(self) -> dict[str, HazardTimes]:
+        """The hazards of each golden run that has some, by its key; none before its checks have passed."""
+        return golden_hazards_of_run(self.path)
+
+    @property
+    def left_out_goldens(self) -> frozenset[str]:
+        """The keys of golden runs whose experiments are left out."""
+        return frozenset(self.golden_hazards if self.head.include is None else ())
 
     @property
     def severity_scale(self) -> SeverityScale | None:

@@ -11,7 +11,7 @@ from mutator._common.hashing import added_field, as_json_types
 from mutator._common.library_and_run_folder_search import RUN_HEAD_FILE
 from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError, TypeMisfit
-from mutator.model import Limits
+from mutator.model import GoldenClass, Limits
 from mutator.store.golden_runs import StoredGolden
 from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import Chunk
@@ -62,6 +62,9 @@ class PlanFacts:
     experiments: int
     runs: int
     limits: Limits
+    include: GoldenClass | None = added_field(
+        None
+    )  # scenarios that run although their golden run has a hazard
     bench: BenchFacts | None = added_field(None)
 
 

@@ -147,11 +147,12 @@ def test_a_refactoring_from_a_fork_passes_and_says_that_sarif_is_left_out(
 
 @pytest.mark.slow
 def test_a_campaign_that_cannot_start_is_an_error_in_the_summary(runner: Runner, repository: Path) -> None:
-    """With this change, the car leaves its lane without any fault."""
+    """With this change, the car leaves its lane without any fault, also where the canary is."""
     change(repository, "tree/toycar/driver.py", "-0.6 * offset", "0.6 * (offset + 1)")
-    assert runner.run({"campaign": "small", "workers": "0"}) == 1, runner.log
+    assert runner.run({"campaign": "small", "workers": "0"}) == 2, runner.log
     [error] = runner.annotations("error")
-    assert error.startswith("::error title=The campaign did not finish::error: ")
+    assert "::error: " in error
+    assert "the canary's golden run" in error
     assert "without any fault" in error
     summary = (runner.temp / "summary.md").read_text()
     assert summary.startswith("## small did not finish on this version\n\n    error: ")

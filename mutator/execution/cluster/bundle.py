@@ -123,6 +123,8 @@ def _growing_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iter
         ],
         "manifest": manifest.path.name,
         "sandbox": workspace.sandbox,
+        "include": as_json_types(head.include),
+        "severity": as_json_types(folder.severity_scale),
     }
     for name in sorted({golden_run.scenario for golden_run in folder.golden_runs}):
         yield f"scenarios/{name}.yaml", read_bounded(workspace.scenario(name))

@@ -113,6 +113,7 @@ class PieceRunner:
             has_seeded_goldens=bundle.meta["several_seeds"],
             scenario_file=bundle.scenario_path,
             with_series=bundle.meta["series"],
+            golden_hazard_rules=bundle.golden_hazard_rules,
         )
 
     def _ensure_golden(self, key: str) -> None:

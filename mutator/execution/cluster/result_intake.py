@@ -5,7 +5,7 @@ from functools import partial
 
 from mutator.errors import MutatorError
 from mutator.execution.cluster.piece_messages import Piece, PieceKind, PieceResult
-from mutator.execution.experiment_runner import record_without_outcome
+from mutator.execution.records_without_outcome import record_without_outcome
 from mutator.execution.written_files import FileDigests
 from mutator.model import Status
 from mutator.outcomes.hazard_and_metric_judgement import load_manifest_channels

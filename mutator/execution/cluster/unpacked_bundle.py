@@ -7,13 +7,16 @@ from typing import Any
 
 from mutator._common.confined_files import checked_relative_path, path_below
 from mutator._common.files import read_json
+from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError
-from mutator.model import Limits, MeasuredLimits
+from mutator.execution.golden_hazards import GoldenHazardRules
+from mutator.model import GoldenClass, Limits, MeasuredLimits
 from mutator.store.golden_runs import GoldenRun
+from mutator.targets.hazard_severity import SeverityScale
 
 BUNDLE_SCHEMA = "bundle/1"
 META_FILE = "meta.json"
-_META_KEYS = {"are_limits_measured", "engine", "seed", "series", "several_seeds"}
+_META_KEYS = {"are_limits_measured", "engine", "include", "seed", "series", "several_seeds", "severity"}
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,14 @@ class UnpackedBundle:
     def limits(self) -> Limits:
         kind = MeasuredLimits if self.meta["are_limits_measured"] else Limits
         return kind(**self.meta["limits"])
+
+    @property
+    def golden_hazard_rules(self) -> GoldenHazardRules:
+        include, scale = self.meta["include"], self.meta["severity"]
+        return GoldenHazardRules(
+            include=GoldenClass(include) if include else None,
+            scale=typed_value_from_json(SeverityScale, scale) if scale else None,
+        )
 
     def scenario_path(self, name: str) -> Path:
         return path_below(self.folder / "scenarios", f"{name}.yaml")

@@ -1,8 +1,8 @@
 """Write a run as JUnit XML: a suite for each fault type, a case for each experiment.
 
 Experiments with a result pass, unless their outcome is listed as a failure. Harness errors and invalid
-mutants are errors; experiments that have not run or were never active are skipped. `file` and `line` are the
-place of the fault in the target's source, `time` is the wall time of the run in s.
+mutants are errors; experiments that have not run, were never active or cannot be judged are skipped. `file`
+and `line` are the place of the fault in the target's source, `time` is the wall time of the run in s.
 """
 
 import re
@@ -81,6 +81,8 @@ class _TestCases:
             ET.SubElement(properties, "property", name=name, value=_xml_text(value))
         if row is None:
             ET.SubElement(case, "skipped", message="not run yet")
+        elif row.ending in (Status.LEFT_OUT, Outcome.NOT_JUDGED):
+            ET.SubElement(case, "skipped", message=_xml_text(row.detail))
         elif not row.usable:
             ET.SubElement(case, "error", type=row.ending, message=_xml_text(row.detail))
         elif row.ending == Outcome.NOT_ACTIVATED:

@@ -148,14 +148,20 @@ def mutant_status_as_json(experiments: Sequence[Experiment], records: Mapping[st
     """Return a fault's status over its runs, its reason, the runs that activated it and, if it was killed,
     those that withstood it.
     """
-    record_by_experiment = {e: records[e.id] for e in experiments if e.id in records}
+    recorded = {e: records[e.id] for e in experiments if e.id in records}
+    missing = len(experiments) - len(recorded)
+    unjudged = [
+        record
+        for record in recorded.values()
+        if record.status is Status.LEFT_OUT or record.outcome is Outcome.NOT_JUDGED
+    ]
+    record_by_experiment = {e: r for e, r in recorded.items() if r not in unjudged}
     records_by_status = {
         status: [r for r in record_by_experiment.values() if r.status is status] for status in Status
     }
     hazardous = [e for e, r in record_by_experiment.items() if r.hazards]
     active = [e for e, r in record_by_experiment.items() if r.activation]
-    drives = counted(len(experiments), "drive")
-    missing = len(experiments) - len(record_by_experiment)
+    drives = counted(len(experiments) - len(unjudged), "drive")
     if hazardous:
         names = sorted({name for e in hazardous for name, _ in record_by_experiment[e].hazards})
         status, reason = "Survived", f"{', '.join(names)} in {len(hazardous)} of {drives}"
@@ -168,11 +174,13 @@ def mutant_status_as_json(experiments: Sequence[Experiment], records: Mapping[st
         status, reason = "RuntimeError", records_by_status[Status.CRASHED][0].detail
     elif records_by_status[Status.TIMEOUT]:
         status, reason = "RuntimeError", records_by_status[Status.TIMEOUT][0].detail
-    elif not records_by_status[Status.OK]:
+    elif records_by_status[Status.HARNESS_ERROR] and not records_by_status[Status.OK]:
         status, reason = (
             "Ignored",
             f"harness errors only: {records_by_status[Status.HARNESS_ERROR][0].detail}",
         )
+    elif not record_by_experiment:
+        status, reason = "Ignored", unjudged[0].detail
     elif active:
         differing = sum(r.outcome is Outcome.SDC for r in records_by_status[Status.OK])
         status, reason = "Killed", f"no hazard; an actuator output differed in {differing} of {drives}"

@@ -10,6 +10,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.results.result_rows import ResultRow, rows_of
 
+_FAILURES = [status.value for status in Status if status not in (Status.OK, Status.LEFT_OUT)]
 _COLUMN_HEADS = ("status", "experiment", "fault", "scenario", "message")
 MOST_RUNS_IN_MARKDOWN, MOST_RUNS_ON_PAGE = (
     30,
@@ -27,7 +28,7 @@ _HTML_TEMPLATE = """\
 
 def build_failed_runs_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of failed runs with their messages; None if no run failed."""
-    results = run.results[run.results["status"] != Status.OK.value]
+    results = run.results[run.results["status"].isin(_FAILURES)]
     if results.empty:
         return None
     sort_keys = {
@@ -38,7 +39,6 @@ def build_failed_runs_panel(run: ReportedRun) -> Panel | None:
         DataFrame(sort_keys).sort_values([*sort_keys]).index[: max(MOST_RUNS_IN_MARKDOWN, MOST_RUNS_ON_PAGE)]
     )
     failed = rows_of(results.loc[order], run.faults)
-    failings = [status.value for status in Status if status is not Status.OK]
     return Panel(
         anchor="failed",
         link="Failed runs",
@@ -47,7 +47,7 @@ def build_failed_runs_panel(run: ReportedRun) -> Panel | None:
             _HTML_TEMPLATE,
             table=_linked_table(failed),
             more=len(results) - MOST_RUNS_ON_PAGE,
-            failings=failings,
+            failings=_FAILURES,
         ),
     )
 

@@ -4,6 +4,7 @@ from mutator.report.answer_parts import warning_filter_values
 from mutator.report.first_screen_facts import describe_change, key_numbers, sample_note, worst_row
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
+from mutator.results.note_on_golden_hazards import golden_hazards_note
 from mutator.results.note_without_canary import no_canary_note
 from mutator.results.result_rows import ResultRow
 
@@ -11,6 +12,9 @@ _HTML_TEMPLATE = """\
 <section class="first-screen" aria-label="The worst experiment, and four numbers">
 {% if no_canary %}
 <p><b>{{ no_canary }}</b></p>
+{% endif %}
+{% if golden_hazards %}
+<p><b>{{ golden_hazards | marked }}</b></p>
 {% endif %}
 {% if worst %}
 <div class="worst">
@@ -67,8 +71,10 @@ def build_first_screen_panel(run: ReportedRun) -> Panel:
     change = describe_change(run)
     lines = [f"* **{number.value}** {number.meaning} ({number.evidence})" for number in numbers]
     no_canary = no_canary_note(run.folder, run.results)
+    golden_hazards = golden_hazards_note(run.folder, run.results)
     parts = [
         f"**{no_canary}**" if no_canary else "",
+        f"**{golden_hazards}**" if golden_hazards else "",
         _worst_markdown(kicker, worst) if worst else "",
         "\n".join(lines),
         note,
@@ -77,6 +83,7 @@ def build_first_screen_panel(run: ReportedRun) -> Panel:
     html = rendered(
         _HTML_TEMPLATE,
         no_canary=no_canary,
+        golden_hazards=golden_hazards,
         worst=worst,
         kicker=kicker,
         numbers=numbers,

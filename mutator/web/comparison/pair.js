@@ -6,7 +6,7 @@
   const panel = document.getElementById("pair"), table = document.querySelector("#changed tbody");
   if (!panel || !table) return;
   const { el } = Dom, facts = JSON.parse(document.getElementById("facts").textContent);
-  const RAN = ["hazard", "sdc", "masked", "not_activated"]; // endings of runs that have channels
+  const RAN = ["hazard", "sdc", "masked", "not_activated", "not_judged"]; // endings of runs that have channels
   const rows = [...table.rows], buttons = rows.map((row) => row.querySelector("button.open"));
   let open = -1;
 

@@ -5,6 +5,7 @@
 class Experiment {
   static ENDINGS = { // why an experiment has no channels, by its status
     crashed: "The run crashed", timeout: "The run did not end in time", invalid_mutant: "The mutant could not be built", harness_error: "The harness failed",
+    left_out: "The experiment was left out",
   };
 
   static open = null; // {id, experiment} for scripts that add buttons; the event `filled` notifies them

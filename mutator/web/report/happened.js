@@ -60,6 +60,7 @@ class Happened {
   static #nothing(status, outcome) {
     if (status === "invalid_mutant") return "The mutant could not be built. This says nothing about the fault.";
     if (status === "harness_error") return "The harness failed. This says nothing about the fault.";
+    if (status === "left_out") return "It was left out, because its golden run has a hazard.";
     return outcome === "not_activated" ? "The fault was never active, so nothing happened." : "No event was recorded.";
   }
 

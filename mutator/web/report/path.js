@@ -50,6 +50,7 @@ const Path = (() => {
   }
 
   function none(results) {
+    if (results.text("status") === "left_out") return "The experiment was left out, so no path was recorded.";
     if (results.text("status") !== "ok") return "The run did not finish normally, so no path was recorded.";
     if (results.text("outcome") === "not_activated") return "The fault was never active.";
     return "No component of the control structure contains the file with the fault.";

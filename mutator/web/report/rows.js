@@ -12,6 +12,8 @@ const Rows = (() => {
     { name: "trigger", title: "Trigger" },
     { name: "outcome", title: "Outcome", none: "no outcome" },
     { name: "status", title: "Status" },
+    { name: "golden_class", title: "Golden run", show: (value) => value.replaceAll("_", " ") },
+    { name: "against_golden", title: "Against golden", none: "not compared", show: (value) => value.replaceAll("_", " ") },
     { name: "severity", title: "Severity", none: "no class", show: (value) => (value === "no class" ? `${value}, any outcome` : value) },
     { name: "hazards", title: "Hazard", between: ";", none: "no hazard" },
     { name: "alerts", title: "Alert", between: ";", none: "no alert" },
@@ -63,10 +65,11 @@ const Rows = (() => {
       this.meanings = meanings; // by column and code
       this.byId = null;
       this.phrases = null;
-      const status = this.columns.get("status");
-      const unusable = status && status.words ? status.words.map((w) => w === "harness_error" || w === "invalid_mutant") : [];
+      const unusable = ["harness_error", "invalid_mutant", "left_out", "not_judged"];
+      const marks = ["status", "outcome"].map((name) => this.columns.get(name)).filter((of) => of && of.words)
+        .map(({ words, codes }) => ({ codes, unusable: words.map((word) => unusable.includes(word)) }));
       // Counts leave out experiments without a valid result.
-      this.usable = (row) => !status || !unusable[status.codes[row]];
+      this.usable = (row) => !marks.some(({ codes, unusable: isUnusable }) => isUnusable[codes[row]]);
     }
 
     text(row, name) {

@@ -103,6 +103,9 @@ TIMEOUT = {"status": Status.TIMEOUT, "outcome": None}
 BROKEN = {"status": Status.HARNESS_ERROR, "outcome": None, "t_activation": None}
 REFUSED = {"status": Status.INVALID_MUTANT, "outcome": None, "t_activation": None}
 SDC = {"outcome": Outcome.SDC, "t_manifest": 2.5}
+GOLDEN_HAZARD = {"golden_class": "hazard_without_fault"}
+LEFT_OUT = GOLDEN_HAZARD | {"status": Status.LEFT_OUT, "outcome": None, "t_activation": None}
+NOT_JUDGED = GOLDEN_HAZARD | {"outcome": Outcome.NOT_JUDGED}
 
 
 @pytest.mark.parametrize(
@@ -136,6 +139,11 @@ SDC = {"outcome": Outcome.SDC, "t_manifest": 2.5}
         (CRASH, TIMEOUT, "otherwise"),
         (HAZARD, CRASH, "new-crash hazard-gone"),
         ({}, BROKEN, "harness-error"),
+        ({}, LEFT_OUT, "golden-hazard harness-error"),
+        ({}, NOT_JUDGED, "golden-hazard harness-error"),
+        ({}, GOLDEN_HAZARD, "golden-hazard"),
+        (LEFT_OUT, {}, "golden-hazard-gone mended"),
+        (LEFT_OUT, GOLDEN_HAZARD | HAZARD, "mended"),
         (REFUSED, HAZARD, "mended"),
         (BROKEN, REFUSED, ""),
     ],

@@ -16,8 +16,18 @@ from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.in_target.early_stop import compile_stop_condition
 from mutator.errors import MutatorError
 from mutator.execution.experiment_runner import ExperimentRunner, RecordedExperiment
+from mutator.execution.golden_hazards import GoldenHazardRules
 from mutator.execution.loaded_goldens import LoadedGoldens
-from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
+from mutator.model import (
+    AfterHazard,
+    AgainstGolden,
+    Experiment,
+    GoldenClass,
+    Method,
+    Outcome,
+    Record,
+    Status,
+)
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.trace_and_record_loading import trace_until
 from mutator.targets.stop_at_hazard_code import stop_function_source
@@ -57,6 +67,10 @@ def stopping(fork: Fork, edit: Edit) -> Iterator[Fork]:
 
 
 def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Record:
+    return run_one(fork, engine, after, at).record
+
+
+def run_one(fork: Fork, engine: Engine, after: AfterHazard, at: float) -> RecordedExperiment:
     manifest = fork.manifest
     experiment = Experiment(
         fault=fork.fault(),
@@ -68,12 +82,15 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
         after_hazard=after,
     )
     goldens = LoadedGoldens(manifest, lambda experiment: fork.golden)
-    runner = ExperimentRunner(manifest, fork.models, engine, goldens, fork.toy.scenario)
+    rules = GoldenHazardRules(include=GoldenClass.HAZARD_WITHOUT_FAULT)
+    runner = ExperimentRunner(
+        manifest, fork.models, engine, goldens, fork.toy.scenario, golden_hazard_rules=rules
+    )
     finished: RecordedExperiment
     (finished,) = runner.run([experiment])
     if engine is fork.engine and finished.record.status is Status.OK:
         assert finished.mode in (RunMode.FORK, RunMode.GOLDEN_REUSED), finished.fallback_reason
-    return finished.record
+    return finished
 
 
 def test_a_stopped_run_equals_the_beginning_of_the_complete_run(stopping: Fork) -> None:
@@ -123,6 +140,37 @@ def test_engines_agree_on_a_run_that_stops_after_its_fault(
     assert reference == forked
     assert (reference.outcome, reference.activation is not None) == (outcome, True)
     assert reference.t_end is not None
+
+
+@pytest.mark.parametrize(
+    ("at", "case", "forks"),
+    [
+        (2.0, AgainstGolden.SAME, True),
+        (3.5, AgainstGolden.SAME, True),
+        (4.0, AgainstGolden.NOT_BEFORE, False),
+        (4.5, AgainstGolden.NOT_BEFORE, False),
+        (1000.0, AgainstGolden.NOT_BEFORE, False),
+    ],
+)
+def test_engines_agree_on_a_run_whose_golden_run_has_a_terminal_hazard(
+    stopping: Fork, edit: Edit, at: float, case: AgainstGolden, forks: bool
+) -> None:
+    """It is forked just before its fault, as any other, unless golden's hazard comes first."""
+    edit(MANIFEST, '"25 >= near and hypot(speed, 0) > 0"', "t >= 4.0")
+    reference, forked = (
+        run_one(stopping, one, AfterHazard.STOP, at) for one in (stopping.engine.reference, stopping.engine)
+    )
+    assert reference.record == forked.record
+    assert (forked.mode, forked.fork_step > 0) == (RunMode.FORK, forks)
+    record = forked.record
+    assert (record.against_golden, record.hazards) == (case, ())
+    assert record.golden_hazards == (("H1", 4.0),)
+    assert record.t_end == 4.0
+    assert (record.outcome is Outcome.NOT_JUDGED) is (case is AgainstGolden.NOT_BEFORE)
+    assert bool(record.detail) is (case is AgainstGolden.NOT_BEFORE)
+    whole = drive(stopping, stopping.engine, AfterHazard.GO_ON, at)
+    expected = None if at == 1000.0 else case  # a run to its end shows that the fault was never active
+    assert whole.against_golden is expected
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from collections import Counter
 
 from mutator.execution.bench_progress import BenchProgress
-from mutator.execution.experiment_runner import record_without_outcome
+from mutator.execution.records_without_outcome import record_without_outcome
 from mutator.model import Record, Status
 from mutator.store.run_progress import Progress
 

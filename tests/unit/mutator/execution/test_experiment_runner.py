@@ -81,6 +81,12 @@ def write(out: Path, **channels: np.ndarray) -> None:
             np.savez(file, **{"time": T, **quiet, **channels})
 
 
+def write_golden(out: Path) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    write(out)
+    (out / "said.json").write_text(json.dumps({"hazards": {}, "alert_events": []}))
+
+
 METRICS = """\
 metrics:
   gas_apart: {max: abs(gas - golden.gas), unit: "-", worse: higher, about: difference of gas from golden}
@@ -97,8 +103,7 @@ def with_metrics(toycar: Workspace) -> None:
 def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
     manifest = toycar.manifest("toycar")
     experiment = build_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
-    (tmp_path / "golden").mkdir()
-    write(tmp_path / "golden")
+    write_golden(tmp_path / "golden")
 
     def judge(status: Status = Status.OK, **outputs: Any) -> Record:
         outputs = {"said": {"hazards": {}, "alert_events": []}, "trace": {"gas": np.zeros(20)}} | outputs
@@ -260,6 +265,7 @@ def test_mutants_that_cannot_be_built_are_not_run(toycar: Workspace, tmp_path: P
     manifest = toycar.manifest("toycar")
     experiments: tuple[Experiment, ...] = build_plan(toycar, "hostile").experiments
     engine = PlayedEngine(tmp_path / "faulty", Status.CRASHED, {"ran": RAN})
+    write_golden(tmp_path)
     goldens = LoadedGoldens(manifest, lambda experiment: tmp_path)
     runner = ExperimentRunner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
     records = {f.experiment.fault.fault_type: f.record for f in runner.run(experiments)}
@@ -279,16 +285,14 @@ def test_nothing_is_compared_with_a_changed_golden_run(
     manifest = toycar.manifest("toycar")
     experiment = build_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
     place = tmp_path / "golden" / "A"
-    place.mkdir(parents=True)
-    write(place)
-    (place / "said.json").write_text("{}")
+    write_golden(place)
     digests = {place: output_digest_of(manifest, place)}
     said: Outputs = {"said": {"hazards": {}, "alert_events": []}, "trace": {"gas": np.zeros(20)}, "ran": RAN}
 
     class Changing(PlayedEngine):
         def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, JobResult]]:
             for job, execution in super().run(jobs):
-                (place / "said.json").write_text("{}")
+                (place / "said.json").write_bytes((place / "said.json").read_bytes())
                 yield job, execution
 
     kind = PlayedEngine if change == "before" else Changing

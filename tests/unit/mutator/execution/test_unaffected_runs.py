@@ -19,8 +19,8 @@ from mutator.engines import fork_results, reference_engine
 from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.execution import earlier_run, unaffected_runs
 from mutator.execution.code_recording import CodeRecording, RecordingAssignment, executed_parts
-from mutator.execution.experiment_runner import record_without_outcome
 from mutator.execution.finished_run_keys import surroundings_by_name
+from mutator.execution.records_without_outcome import record_without_outcome
 from mutator.execution.session_summary import Summary
 from mutator.execution.unaffected_runs import TargetChange, UnaffectedRuns
 from mutator.model import RunError, Status

@@ -83,7 +83,6 @@ def test_a_damaged_golden_run_is_replaced(toycar: Workspace, tmp_path: Path) -> 
     [
         ("case[\"gap\"] += number", "case[\"gap\"] += hash('x') % 9 + number", "nothing but PYTHONHASHSEED"),
         ("npy(column))", "npy(column) + __import__('os').urandom(1))", "different bytes"),
-        ("case[\"gap\"] += number", "case[\"gap\"] -= 39.9 + number", "reaches H1 at 0 s without"),
         ("import json\n", "import json\nimport nosuch\n", "crashed: ModuleNotFoundError"),
         ("ZipFile(to / \"log.npz\"", "ZipFile(to / \"other.npz\"", "not a readable trace"),
         ("now = world.advance", "now = 0\n        now = world.advance", "matches 2 statements"),
@@ -91,7 +90,7 @@ def test_a_damaged_golden_run_is_replaced(toycar: Workspace, tmp_path: Path) -> 
          "        said['files'] = len([n for n in names if n.endswith('.py')])\n        (to / \"said.json\")",
          "the probe alone changes what the target does"),
     ],
-    ids=["hash order", "random", "hazard", "import", "no trace", "anchor", "sees the probe"],
+    ids=["hash order", "random", "import", "no trace", "anchor", "sees the probe"],
 )  # fmt: skip
 def test_an_unsound_target_is_refused(
     toycar: Workspace, tmp_path: Path, old: str, new: str, told: str
@@ -130,6 +129,20 @@ def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None
     values = sorted((fault.value for fault in faults), reverse=True)
     assert len(values) == spec.fault_count == 4
     assert error.value.got.endswith(", ".join(f"{value} m" for value in values))
+
+
+def test_a_canary_in_a_scenario_with_a_hazard_without_fault_is_refused(
+    toycar: Workspace, tmp_path: Path
+) -> None:
+    """It would reach its hazard whatever the fault does."""
+    change(toycar, 'case["gap"] += number', 'case["gap"] -= 39.9 + number')
+    change(toycar, '"gap": 500.0', '"gap": 30.0')
+    with pytest.raises(MutatorError) as error:
+        run_checks(toycar, frozen(toycar, tmp_path))
+    assert error.value.exit_code == 2
+    assert error.value.got == "the canary's golden run A has a hazard without any fault, H1 at 0.00 s"
+    assert Path(error.value.where or "").name == "campaign.yaml"
+    assert error.value.line
 
 
 def test_a_canary_that_does_harm_with_another_value_passes(toycar: Workspace, tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ def made_at_once(folder: RunFolder) -> dict[str, bytes]:
     records = folder.records()
     planned = sorted(plan_file.load_experiments(folder.path), key=lambda e: e.id)
     done = [(e, records[e.id]) for e in planned if e.id in records]
-    columns = result_columns_of(folder.head)
+    columns = result_columns_of(folder)
     names = [column.name for column in columns]
     made = [
         cells_by_column(columns, [FinishedExperiment(*one, folder.severity_scale, fault_paths_of(folder))])
@@ -222,7 +222,7 @@ def test_tables_are_rebuilt_after_a_change_of_columns(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, change: Callable[..., Any]
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(table_building, "result_columns_of", lambda head: change(result_columns_of(head)))
+        patch.setattr(table_building, "result_columns_of", lambda folder: change(result_columns_of(folder)))
         table_building.build_tables(folder.path)
     assert is_rebuilt(folder, monkeypatch)
 

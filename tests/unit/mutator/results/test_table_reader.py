@@ -36,7 +36,6 @@ from mutator.results.table_reader import Results, _load_columns, frame_of_experi
 from mutator.statistics.results_frame import hazard_names, load_usable_results, prepare_results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import load_head
 from mutator.targets.process_environment import THREAD_VARIABLES
 from mutator.targets.stored_target_facts import metric_facts
 from mutator.workspace import Workspace
@@ -262,8 +261,8 @@ def test_the_types_of_a_frame_are_those_of_the_table(run: Path) -> None:
     table = Results.up_to_date(run)
     (run / "results.csv").unlink()
     frame = table.frame()
-    kinds = {c.name: frame[c.name].dtype for c in result_columns_of(load_head(run))}
-    texts = {c.name for c in result_columns_of(load_head(run)) if c.type == "text"}
+    kinds = {c.name: frame[c.name].dtype for c in result_columns_of(RunFolder(run))}
+    texts = {c.name for c in result_columns_of(RunFolder(run)) if c.type == "text"}
     assert {name for name, kind in kinds.items() if kind == "str"} == texts
     assert all(kind.kind in "if" for name, kind in kinds.items() if name not in texts)
     assert set(frame["alerts"]) == {""} and frame["t_alert"].isna().all()

@@ -9,7 +9,7 @@ import pytest
 
 from mutator._common.hashing import canonical_json
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import ObservedActivation, Outcome, Record, RunError, Status
+from mutator.model import AgainstGolden, ObservedActivation, Outcome, Record, RunError, Status
 from mutator.store import run_progress
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import RECORDS_SCHEMA, load_records, record_as_json
@@ -42,7 +42,20 @@ def test_a_line_equals_asdict(record: MakeRecord) -> None:
     activation = ObservedActivation(first=1.0, last=2.0, count=3)
     error = RunError(kind="ValueError", message="no", place="a.py:3")
     for one in (record(), replace(record(), activation=activation), replace(record(), error=error)):
-        assert canonical_json(record_as_json(one)) == canonical_json(asdict(one))
+        expected = asdict(one)
+        assert (expected.pop("against_golden"), expected.pop("golden_hazards")) == (None, ())
+        assert canonical_json(record_as_json(one)) == canonical_json(expected)
+
+
+def test_a_line_has_how_hazards_compare_with_goldens_only_if_golden_has_some(
+    tmp_path: Path, record: MakeRecord
+) -> None:
+    """So the lines of all other runs keep their bytes, and their digests."""
+    compared = replace(record("a" * 16), against_golden=AgainstGolden.LATER, golden_hazards=(("H1", 12.5),))
+    line = record_as_json(compared)
+    assert (line["against_golden"], line["golden_hazards"]) == ("later", (("H1", 12.5),))
+    write(tmp_path, "0001-gw0.jsonl", compared)
+    assert load_records(tmp_path) == {"a" * 16: compared}
 
 
 def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeRecord) -> None:

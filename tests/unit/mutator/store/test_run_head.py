@@ -92,7 +92,16 @@ def test_a_value_of_another_type_is_refused_by_its_key(run: Path) -> None:
 
 def test_each_key_is_needed_unless_it_is_optional(run: Path) -> None:
     path, original = run / "run.json", json.loads((run / "run.json").read_text())
-    optional = {"seeds", "operators", "bench", "speed", "phrases", "scenarios", "keys_of_later_versions"}
+    optional = {
+        "seeds",
+        "operators",
+        "include",
+        "bench",
+        "speed",
+        "phrases",
+        "scenarios",
+        "keys_of_later_versions",
+    }
     assert {field.name for field in dataclasses.fields(RunHead)} - optional == original.keys() - optional
     for key in original.keys() - {"schema", *optional}:
         path.write_text(json.dumps({name: value for name, value in original.items() if name != key}))

@@ -1,0 +1,68 @@
+"""What a worker does with experiments whose golden run has a hazard: leave them out, or judge what the fault
+added.
+"""
+
+from dataclasses import dataclass
+
+from mutator.execution.loaded_goldens import LoadedGoldens
+from mutator.model import Experiment, GoldenClass, ObservedActivation
+from mutator.outcomes.golden_hazard_rules import (
+    DriveHazards,
+    HazardComparison,
+    compare_with_golden,
+    drive_hazards_of,
+)
+from mutator.outcomes.hazard_and_metric_judgement import RunJudgement
+from mutator.outcomes.verdict_rules import first_events_after
+from mutator.store.checks_file import HazardTimes, describe_golden_hazards
+from mutator.store.golden_runs import GoldenRun
+from mutator.targets.hazard_severity import SeverityScale
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoldenHazardRules:
+    """`include`: the class of scenarios that run besides hazard-free ones; None: no other. `scale` says which
+    hazard is worse.
+    """
+
+    include: GoldenClass | None = None
+    scale: SeverityScale | None = None
+
+    def leaves_out(self, goldens: LoadedGoldens, experiment: Experiment) -> bool:
+        """Whether an experiment does not run, because its golden run has a hazard."""
+        is_included = self.include is GoldenClass.HAZARD_WITHOUT_FAULT
+        return not is_included and bool(goldens.hazards_of(experiment))
+
+    def compare(
+        self,
+        goldens: LoadedGoldens,
+        experiment: Experiment,
+        judged: RunJudgement,
+        activation: ObservedActivation | None,
+        *,
+        was_stopped: bool,
+    ) -> HazardComparison:
+        """Return the hazards of a run that count, and how they compare with those of a golden run that has
+        some.
+        """
+        if not goldens.hazards_of(experiment):
+            return HazardComparison(case=None, hazards=first_events_after(judged.hazards, activation))
+        return compare_with_golden(
+            self._drive_of(goldens.judgement_of(experiment)),
+            self._drive_of(judged),
+            activation,
+            step_s=goldens.step_s,
+            was_stopped=was_stopped,
+        )
+
+    def _drive_of(self, judged: RunJudgement) -> DriveHazards:
+        return drive_hazards_of(judged, self.scale)
+
+
+LEAVING_OUT = GoldenHazardRules()  # all experiments whose golden run has a hazard
+
+
+def reason_left_out(experiment: Experiment, hazards: HazardTimes) -> str:
+    """Return why an experiment did not run, whose golden run has these hazards."""
+    name = GoldenRun.for_experiment(experiment, several_seeds=False).key
+    return f"the golden run of {name} has a hazard without any fault: {describe_golden_hazards(hazards)}"
