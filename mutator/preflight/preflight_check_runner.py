@@ -72,7 +72,9 @@ class CheckRunner:
             # last, because it waits for the golden runs, which have then begun
             judged = pool.submit(self._judge_canary_after_goldens, engine, futures)
             nulls = [future for name, future in futures.items() if name[0] == NULL_MUTANT]
-            goldens = [future for name, future in futures.items() if name[0] in (GOLDEN, FORKED)]
+            goldens = [future for name, future in futures.items() if name[0] == GOLDEN]
+            if forked := [future for name, future in futures.items() if name[0] == FORKED]:
+                _report_progress("golden", forked, notify)  # by far the most
             _report_progress("checks", [judged, *nulls], notify)
             _report_progress("golden", goldens, notify)
             runs = {name: future.result() for name, future in futures.items()}
