@@ -20,7 +20,8 @@ def test_list_shows_every_kind(cli: Cli, root: Path) -> None:
 
 def test_list_as_json_is_one_document(cli: Cli, root: Path) -> None:
     listed = cli("list", "--json").json
-    assert set(listed) == {"specs", "scenarios", "campaigns", "models", "triggers", "targets"}
+    kinds = {"specs", "scenarios", "families", "campaigns", "models", "triggers", "targets"}
+    assert set(listed) == kinds
     assert [(s["name"], s["faults"]) for s in listed["specs"]] == [
         ("sensor/distance", 6),
         ("sensor/lane", 4),
