@@ -14,7 +14,7 @@ from pathlib import Path
 import mutator
 from mutator.campaigns.row_filters import matching_items
 from mutator.model import Experiment
-from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
+from mutator.results.plan_columns import plan_column_names, plan_row
 
 
 class _ProofLeftOutError(Exception):
@@ -25,7 +25,7 @@ def change_experiments(
     experiments: Iterable[Experiment], changes: Sequence[str], only: str
 ) -> list[Experiment]:
     """Return the experiments that match `only` ("": all), with the changes added to their setting."""
-    kept = matching_items(experiments, only, PLAN_COLUMN_NAMES, plan_row) if only else experiments
+    kept = matching_items(experiments, only, plan_column_names(), plan_row) if only else experiments
     return [replace(experiment, setting=(*experiment.setting, *changes)) for experiment in kept]
 
 

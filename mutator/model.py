@@ -250,7 +250,7 @@ class Experiment:
     setting: tuple[str, ...] = ()  #: changes of the scenario that the campaign makes for all its experiments
     #: whether the run continues after a terminal hazard: `go_on` or `stop`
     after_hazard: AfterHazard = added_field(AfterHazard.GO_ON)
-    #: the scenario, if a family gave it, until a plan has it; name and digest identify it
+    #: the scenario, if a family gave it; name and digest identify it
     concrete: ConcreteScenario | None = field(default=None, compare=False, repr=False)
 
     @cached_property
@@ -278,7 +278,17 @@ class Experiment:
         trigger.
         """
         name = self.trigger.name.removeprefix(f"{self.method.value}/")
-        return f"{self.scenario}, {f'{self.method_text} {name}'.lstrip()}"
+        return f"{self.scenario_label}, {f'{self.method_text} {name}'.lstrip()}"
+
+    @property
+    def scenario_label(self) -> str:
+        """The label of the scenario: `S1`, or family and values, `follow, ego 60 km/h, gap 20 m`."""
+        return f"{self.concrete.family}, {self.concrete.label}" if self.concrete else self.scenario
+
+    @property
+    def family_or_scenario(self) -> str:
+        """The family that gave the scenario, or the scenario of the library."""
+        return self.concrete.family if self.concrete else self.scenario
 
     @property
     def method_text(self) -> str:

@@ -231,7 +231,7 @@ def experiment_facts(experiment: Experiment) -> dict[str, Any]:
         "fault": fault.label,
         "aim": fault.aim,
         "reading": fault.reading,
-        "scenario": " ".join((experiment.scenario, *experiment.changes)),
+        "scenario": " ".join((experiment.scenario_label, *experiment.changes)),
         "method": experiment.method.value,
         "trigger": f"{trigger.name}: {trigger.condition}",
         "armed_after_s": trigger.armed_after_s,

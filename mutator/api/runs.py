@@ -36,6 +36,7 @@ from mutator.results import outcome_counting
 from mutator.results import table_building as results_table
 from mutator.results.note_on_golden_hazards import golden_hazards_note
 from mutator.results.note_without_canary import no_canary_note
+from mutator.statistics.family_statistics import scenarios_frame
 from mutator.statistics.fault_free_drive_tables import (
     describe_drives,
     each_drive_sheet,
@@ -46,6 +47,7 @@ from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import run_deletion
 from mutator.store.golden_runs import GoldenRun
+from mutator.store.planned_scenarios import planned_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
 from mutator.targets.overhead_view_json import scene_as_json
@@ -160,6 +162,21 @@ class Run(RunFigures):
         """Return the drives, hours, hazards and alerts of `drives` in a sentence; empty if there are none."""
         drives = load_judged_drives(self.folder)
         return describe_drives(drives) if drives else ""
+
+    @cached_property
+    def families(self) -> "pd.DataFrame":
+        """The concrete scenarios that families gave, a row each, indexed by name; empty without families.
+
+        Columns: `family`, `label` (the values as text), each parameter, `golden_hazards` (joined by `;`; no
+        value before the golden run), `golden_` and the name of each metric. Then come numbers of
+        experiments with a valid result: `experiments`, by outcome, `failed` (crashed or timed out), and by
+        hazard.
+        """
+        planned = planned_scenarios_of(self.path)
+        scenarios = [each.scenario for each in planned.by_name.values()] if planned else []
+        usable = prepare_results(self._results_frame)
+        drives = load_judged_drives(self.folder)
+        return scenarios_frame(self.folder.head.families, scenarios, usable, drives)
 
     def alerts_note(self) -> str:
         """Return a sentence on the alerts that golden runs also raise; empty if there are none."""

@@ -160,6 +160,7 @@ def _rows_worst_first(folder: RunFolder, ended: Sequence[tuple[Experiment, Recor
         return []
     scale = folder.severity_scale
     finished = [FinishedExperiment(experiment, record, scale) for experiment, record in ended]
-    frame = frame_of_finished(result_columns_of(folder), finished, folder.head.hazards)
+    head = folder.head
+    frame = frame_of_finished(result_columns_of(folder), finished, head.hazards, head.families)
     order = worst_first_ranks(frame).argsort().tolist()
     return rows_of(frame.iloc[order], {e.fault.id: e.fault for e, _ in ended})

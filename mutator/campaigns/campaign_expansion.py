@@ -22,11 +22,14 @@ from mutator.campaigns.plan_tally import FaultFreeDrive
 from mutator.campaigns.sampling import evenly_spread_indices
 from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError
+from mutator.families.family import Family
+from mutator.families.family_facts import FamilyFacts
 from mutator.families.scenario_sampling import sample_scenarios
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import ConcreteScenario, Experiment, Fault, Method, Trigger
 from mutator.operators.executed_lines_and_types import GoldenRunInputs
+from mutator.results.table_columns import check_parameter_names
 from mutator.store.golden_runs import GoldenRun
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger, draw_trigger_time, trigger_at_time
@@ -231,14 +234,32 @@ class CampaignExpansion:
             if isinstance(selection, str):
                 names.append(selection)
                 continue
+            family = self._family_by_place[i]
             with self._errors_located_at(("scenarios", i, "family")):
-                family = self.workspace.family(checked_name_not_path(selection.family, self.campaign.path))
                 drawn = sample_scenarios(
                     family, selection.count, selection.sampling or family.sampling, self._first_seed
                 )
             self._digest_and_concrete_by_scenario |= {s.name: (s.digest, s) for s in drawn}
             names += [scenario.name for scenario in drawn]
         return tuple(names)
+
+    @property
+    def families(self) -> tuple[FamilyFacts, ...]:
+        """The families from which the campaign draws scenarios, in the order of the file."""
+        return tuple(family.facts for family in self._family_by_place.values())
+
+    @cached_property
+    def _family_by_place(self) -> dict[int, Family]:
+        """The families by their places in the campaign's list of scenarios."""
+        families: dict[int, Family] = {}
+        for i, selection in enumerate(self.campaign.scenario_selections):
+            if isinstance(selection, str):
+                continue
+            with self._errors_located_at(("scenarios", i, "family")):
+                name = checked_name_not_path(selection.family, self.campaign.path)
+                families[i] = self.workspace.family(name)
+                check_parameter_names(self.manifest, families[i].facts)
+        return families
 
     def _unmatched_pattern_error(
         self, keys: KeyPath, pattern: str, library: Sequence[_NumberedFault] = ()

@@ -28,8 +28,9 @@ from mutator.campaigns.row_filters import matching_items
 from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_in_proportion
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
 from mutator.errors import MutatorError
+from mutator.families.family_facts import FamilyFacts
 from mutator.model import AfterHazard, Experiment, MeasuredLimits
-from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
+from mutator.results.plan_columns import columns_of_plan, plan_column_names, plan_row
 from mutator.store import plan_file
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_choices import Choices
@@ -83,6 +84,7 @@ class Plan:
     cpu_limit_s: int | None = None
     operator_notes: tuple[str, ...] = ()  #: how many mutants the operators produced, and what was left out
     drives: tuple[FaultFreeDrive, ...] = ()  #: the runs of a campaign without faults
+    families: tuple[FamilyFacts, ...] = ()  #: the families that gave scenarios
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")
@@ -132,7 +134,8 @@ class Plan:
 
     def rows(self) -> list[dict[str, object]]:
         """Return one dict per experiment: the result columns that are known before it runs."""
-        return [plan_row(experiment) for experiment in self.experiments]
+        columns = columns_of_plan(self.families)
+        return [plan_row(experiment, columns) for experiment in self.experiments]
 
     def goldens(self) -> tuple[GoldenRun, ...]:
         """Return every golden run that the plan needs, including that of a canary."""
@@ -193,6 +196,11 @@ class SeedBySeedPlan:
         """How many mutants the operators produced, and what was left out; known once the parts exist."""
         return self._expansion.operator_notes
 
+    @property
+    def families(self) -> tuple[FamilyFacts, ...]:
+        """The families that give scenarios."""
+        return self._expansion.families
+
     def empty_tally(self) -> PlanTally:
         return PlanTally(canary=self.canary, has_several_seeds=len(self.seeds) > 1, drives=self.drives)
 
@@ -242,13 +250,36 @@ class SeedBySeedPlan:
         runs_in_order = order_for_sharing(
             group_by_run(
                 self._manifest,
-                _choose_experiments(experiments, self.campaign, self.choices, seed, most_experiments),
+                self._choose_experiments(experiments, seed, most_experiments),
             )
         )
         return PlanPart(
             experiments=tuple(experiment for same in runs_in_order for experiment in same),
             chunk_lengths=chunk_lengths_of_runs(runs_in_order, self.campaign.chunk_size),
             run_count=len(runs_in_order),
+        )
+
+    def _choose_experiments(
+        self, experiments: tuple[Experiment, ...], seed: int, most_experiments: int | None
+    ) -> tuple[Experiment, ...]:
+        if self.campaign.sample_size is not None:
+            experiments = _sample_experiments(experiments, self.campaign, self.campaign.sample_size, seed)
+        columns = columns_of_plan(self.families)
+        for text, selects in ((self.choices.only, True), (self.choices.exclude, False)):
+            if text is not None:
+                experiments = tuple(
+                    matching_items(
+                        experiments,
+                        text,
+                        plan_column_names(self.families),
+                        lambda experiment: plan_row(experiment, columns),
+                        keeps_matches=selects,
+                    )
+                )
+        return (
+            experiments
+            if most_experiments is None
+            else draw_balanced_pairs(experiments, most_experiments, seed)
         )
 
     def _check_shards(self, chunk_count: int) -> None:
@@ -291,25 +322,7 @@ def build_plan(workspace: Workspace, campaign: str | Path, choices: Choices | No
         runs=sum(part.run_count for part in parts),
         cpu_limit_s=None if "cpu_s" in loaded.measured_limit_names else loaded.limits.cpu_s,
         operator_notes=planning.operator_notes,
-    )
-
-
-def _choose_experiments(
-    experiments: tuple[Experiment, ...],
-    campaign: Campaign,
-    choices: Choices,
-    seed: int,
-    most_experiments: int | None,
-) -> tuple[Experiment, ...]:
-    if campaign.sample_size is not None:
-        experiments = _sample_experiments(experiments, campaign, campaign.sample_size, seed)
-    for text, selects in ((choices.only, True), (choices.exclude, False)):
-        if text is not None:
-            experiments = tuple(
-                matching_items(experiments, text, PLAN_COLUMN_NAMES, plan_row, keeps_matches=selects)
-            )
-    return (
-        experiments if most_experiments is None else draw_balanced_pairs(experiments, most_experiments, seed)
+        families=planning.families,
     )
 
 
@@ -351,6 +364,7 @@ def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
         cpu_limit_s=limits.cpu_s if is_limit_known else None,
         operator_notes=head.operators,
         drives=_drives_of_run(folder) if campaign.is_fault_free else (),
+        families=head.families,
     )
     if tally is not None:
         vars(plan)["tally"] = tally  # set the cached property; computing it would read every experiment

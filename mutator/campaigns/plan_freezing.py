@@ -1,10 +1,7 @@
 """Freezes a plan into a run folder, together with the digests of its sources."""
 
-import csv
-import io
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +24,8 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError
 from mutator.model import Experiment
-from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
+from mutator.results.csv_and_parquet_writers import csv_lines
+from mutator.results.plan_columns import PlanColumn, columns_of_plan
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
 from mutator.store.plain_contents_check import check_plain_contents
@@ -155,10 +153,11 @@ def _write_plan_files(
             for path in (out / PLAN_CSV, out / plan_file.EXPERIMENTS_FILE, out / plan_file.FAULTS_FILE)
         )
         writer = plan_file.PlanWriter(lines, faults)
-        rows.write(plan_csv_lines([], with_head=True))
+        columns = columns_of_plan(plan.families)
+        rows.write(plan_csv_head(columns))
 
         def write(part: PlanPart) -> None:
-            rows.write(plan_csv_lines(part.experiments))
+            rows.write(plan_csv_lines(part.experiments, columns))
             writer.append(part.experiments, part.chunk_lengths)
             used.add(experiment.fault for experiment in part.experiments)
 
@@ -214,6 +213,7 @@ def _build_head(
         phrases=phrases_of_campaign(workspace, plan.campaign, manifest, plan.reading, used),
         goldens=tuple(golden.to_stored() for golden in tally.listed_goldens),
         scenarios=scenarios.sha256 if scenarios else None,
+        families=plan.families,
         canary=canary,
         canary_hazard=plan.campaign.canary.hazard if plan.campaign.canary else None,
         sources=_source_digests(tally, plan, workspace),
@@ -240,14 +240,15 @@ def collect_target_facts(workspace: Workspace, manifest: TargetManifest) -> Targ
     )
 
 
-def plan_csv_lines(experiments: Iterable[Experiment], *, with_head: bool = False) -> bytes:
-    writer = csv.writer(text := io.StringIO(), lineterminator="\n")
-    if with_head:
-        writer.writerow(PLAN_COLUMN_NAMES)
-    cells = itemgetter(*PLAN_COLUMN_NAMES)
-    writer.writerows(cells(plan_row(experiment)) for experiment in experiments)
-    return text.getvalue().encode()
+def plan_csv_head(columns: Sequence[PlanColumn]) -> bytes:
+    return csv_lines([[column.name for column in columns]])
+
+
+def plan_csv_lines(experiments: Iterable[Experiment], columns: Sequence[PlanColumn]) -> bytes:
+    return csv_lines([column.cell_of(experiment) for column in columns] for experiment in experiments)
 
 
 def plan_csv_bytes(plan: Plan) -> bytes:
-    return plan_csv_lines(plan.experiments, with_head=True)
+    # the plan of a bench can get scenarios of other families at any time, its first line is written once
+    columns = columns_of_plan(() if plan.campaign.is_bench else plan.families)
+    return plan_csv_head(columns) + plan_csv_lines(plan.experiments, columns)

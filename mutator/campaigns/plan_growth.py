@@ -23,11 +23,13 @@ from mutator.campaigns.phrase_collection import (
     phrases_of_campaign,
     phrases_of_contexts,
 )
-from mutator.campaigns.plan_freezing import PLAN_CSV, collect_target_facts, plan_csv_lines
+from mutator.campaigns.plan_freezing import PLAN_CSV, collect_target_facts, plan_csv_head, plan_csv_lines
 from mutator.campaigns.plan_tally import PlanDigestBuilder, PlanPart, PlanTally
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import run_key
 from mutator.model import Experiment
+from mutator.results.plan_columns import columns_of_plan
+from mutator.results.table_columns import check_parameter_names
 from mutator.store import file_digests, plan_file
 from mutator.store.appended_files import AppendedFile
 from mutator.store.file_digests import DigestLedger, FileDigest
@@ -122,14 +124,19 @@ class GrowingPlan:
         return tuple(dict.fromkeys((*self.golden_runs, *of_batch)))
 
     def append(self, experiments: Sequence[Experiment], reason: str) -> RunFolder:
-        """Add a batch of new experiments, and return the run folder as it is then."""
-        first = 0 if self.ids else len(plan_csv_lines([], with_head=True))
-        if first:
-            self._files[PLAN_CSV].add(plan_csv_lines([], with_head=True))
+        """Add a batch of new experiments, and return the run folder as it is then.
+
+        MutatorError if a family's parameter has the name of another column.
+        """
+        for name in {e.concrete.family for e in experiments if e.concrete} - {*self._tally.families}:
+            check_parameter_names(self._manifest, self._workspace.family(name).facts)
+        columns = columns_of_plan()
+        if not self.ids:
+            self._files[PLAN_CSV].add(plan_csv_head(columns))
         faults = {e.fault.id: e.fault for e in experiments if e.fault.id not in self._fault_ids}
         self._files[EXPERIMENTS_FILE].add(b"".join(map(plan_file.experiment_line, experiments)))
         self._files[FAULTS_FILE].add(b"".join(map(plan_file.fault_line, faults.values())))
-        self._files[PLAN_CSV].add(plan_csv_lines(experiments))
+        self._files[PLAN_CSV].add(plan_csv_lines(experiments, columns))
         self._files[BATCHES_FILE].add(self._batches.line_of_next(len(experiments), reason))
         planned = set(self._tally.golden_runs())
         self._count(experiments)
@@ -238,6 +245,7 @@ class GrowingPlan:
             phrases=self._current_phrases(),
             goldens=tuple(golden.to_stored() for golden in goldens),
             scenarios=scenarios.sha256 if scenarios.size else None,
+            families=tuple(self._workspace.family(name).facts for name in self._tally.families),
             sources=self._sources(),
             stretches=stored.stretches,
             chunks=tuple(self._chunks),
@@ -264,8 +272,7 @@ class GrowingPlan:
     def _sources(self) -> Mapping[str, str]:
         names = sorted({golden.scenario for golden in self._tally.listed_goldens})
         files = {f"scenario {name}": self._workspace.scenario(name) for name in names}
-        families = sorted({concrete.family for concrete in self._tally.concrete_by_name.values()})
-        files |= {f"family {name}": self._workspace.family(name).path for name in families}
+        files |= {f"family {name}": self._workspace.family(name).path for name in self._tally.families}
         for source, path in files.items():
             if source not in self._scenario_digests:  # the bench refuses a batch if a file was edited
                 self._scenario_digests[source] = digest(read_bounded(path))

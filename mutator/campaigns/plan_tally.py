@@ -79,6 +79,11 @@ class PlanTally:
         return tuple(dict.fromkeys((*self.goldens_without_canary, canary_golden)))
 
     @property
+    def families(self) -> tuple[str, ...]:
+        """The names of the families that gave scenarios, sorted."""
+        return tuple(sorted({concrete.family for concrete in self.concrete_by_name.values()}))
+
+    @property
     def listed_goldens(self) -> tuple[GoldenRun, ...]:
         """The golden runs of the library's scenarios."""
         return tuple(run for run in self.golden_runs() if run.scenario not in self.concrete_by_name)

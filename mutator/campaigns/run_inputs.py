@@ -55,8 +55,7 @@ class RunInputs(PickledValue):
     def of_plan(cls, workspace: "Workspace", manifest: TargetManifest, tally: "PlanTally") -> "RunInputs":
         """Return the inputs of a plan that is in no run folder; MutatorError as in `from_workspace`."""
         inputs = cls.from_workspace(workspace, manifest, {run.scenario for run in tally.listed_goldens})
-        families = {concrete.family for concrete in tally.concrete_by_name.values()}
-        return inputs._with_families(workspace, families)
+        return inputs._with_families(workspace, tally.families)
 
     @classmethod
     def of_run(cls, workspace: "Workspace", folder: RunFolder) -> "RunInputs":

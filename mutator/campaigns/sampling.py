@@ -8,7 +8,7 @@ from dataclasses import replace
 from mutator._common.hashing import digest
 from mutator.model import AfterHazard, Experiment
 
-_Cell = tuple[str, str, str, str]  # variant, method or methods, scenario, trigger
+_Cell = tuple[str, str, str, str]  # variant, method or methods, family or scenario, trigger
 
 
 def evenly_spread_indices(count: int, size: int) -> list[int]:
@@ -21,7 +21,8 @@ def evenly_spread_indices(count: int, size: int) -> list[int]:
 def draw_balanced(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
     """Draw `count` experiments, balanced over variants first, then over method, scenario and trigger.
 
-    The experiments keep their order. A hash of seed and id selects values and breaks ties.
+    The experiments keep their order. A hash of seed and id selects values and breaks ties. The scenarios of a
+    family count as one, and take turns.
     """
     return _draw_units(experiments, [[experiment] for experiment in experiments], count, seed)
 
@@ -49,6 +50,9 @@ def _draw_units(
     for unit in sorted(units, key=lambda unit: digest([seed, _ignoring_after_hazard(unit[0]).id])):
         cell = _cell(unit)
         cells[cell[0]].setdefault(cell, deque()).append(unit)
+    for cells_of_variant in cells.values():
+        for cell, units_of_cell in cells_of_variant.items():
+            cells_of_variant[cell] = deque(_taking_turns(units_of_cell))
     count_by_property: Counter[Hashable] = Counter()
     chosen: set[str] = set()
     while len(chosen) < count:
@@ -66,6 +70,16 @@ def _draw_units(
     return tuple(e for e in experiments if e.id in chosen)
 
 
+def _taking_turns(units: Iterable[list[Experiment]]) -> list[list[Experiment]]:
+    """Sort units so that the first of each scenario come first, then the second of each, and so on."""
+    turns: Counter[str] = Counter()
+    ranked = []
+    for unit in units:
+        ranked.append((turns[unit[0].scenario], unit))
+        turns[unit[0].scenario] += 1
+    return [unit for _, unit in sorted(ranked, key=lambda turn_and_unit: turn_and_unit[0])]
+
+
 def _ignoring_after_hazard(experiment: Experiment) -> Experiment:
     """Remove `after_hazard`, so that campaigns with and without it draw the same sample."""
     goes_on = experiment.after_hazard is AfterHazard.GO_ON
@@ -75,7 +89,7 @@ def _ignoring_after_hazard(experiment: Experiment) -> Experiment:
 def _cell(unit: Sequence[Experiment]) -> _Cell:
     first = unit[0]
     methods = "+".join(experiment.method.value for experiment in unit)
-    return (first.fault.spec, methods, first.scenario, first.trigger.name)
+    return (first.fault.spec, methods, first.family_or_scenario, first.trigger.name)
 
 
 def _balanced_properties(cell: _Cell) -> Iterable[Hashable]:
@@ -98,16 +112,18 @@ def _counts_of_properties(count_by_property: Counter[Hashable], cell: _Cell) -> 
 def draw_in_proportion(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
     """Draw `count` experiments, guided and random ones in pairs, in their original order.
 
-    Each fault type in each scenario is sampled systematically, in proportion to its number of experiments,
-    with at least one pair. ValueError if the count is too small or not a whole number of pairs.
+    Each fault type in each scenario, or family of them, is sampled systematically, in proportion to its
+    number of experiments, with at least one pair. ValueError if the count is too small or not a whole number
+    of pairs.
     """
     if count >= len(experiments):
         return tuple(experiments)
     strata: dict[_Stratum, dict[_PairKey, list[Experiment]]] = defaultdict(dict)
     for experiment in experiments:
         fault = experiment.fault
-        stratum = (fault.module, fault.fault_type, experiment.scenario)
-        strata[stratum].setdefault(_pair_key(experiment), []).append(experiment)
+        stratum = (fault.module, fault.fault_type, experiment.family_or_scenario)
+        in_family = (experiment.scenario,) if experiment.concrete else ()
+        strata[stratum].setdefault((*_pair_key(experiment), *in_family), []).append(experiment)
     size = len({experiment.method for experiment in experiments})
     if count % size or count // size < len(strata):
         raise ValueError(f"a multiple of {size}, {size * len(strata)} or more")
@@ -124,11 +140,11 @@ def draw_in_proportion(experiments: Sequence[Experiment], count: int, seed: int)
     return tuple(e for e in experiments if e.id in chosen)
 
 
-_Stratum = tuple[str, str, str]  # module, fault type, scenario
-_PairKey = tuple[str, str, str]  # variant, row of the context table, fault
+_Stratum = tuple[str, str, str]  # module, fault type, family or scenario
+_PairKey = tuple[str, ...]  # variant, row of the context table, fault; in a family, also the scenario
 
 
-def _pair_key(experiment: Experiment) -> _PairKey:
+def _pair_key(experiment: Experiment) -> tuple[str, str, str]:
     """Return what a guided experiment and its random partner have in common within a scenario."""
     row = experiment.trigger.name.removeprefix("random/")
     return (experiment.fault.spec, row, experiment.fault.id)

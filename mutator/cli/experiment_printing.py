@@ -102,7 +102,7 @@ def _cells_by_head(row: "ResultRow", id_length: int | None) -> dict[str, object]
         "margin": _rounded_as_in_sentences(row.margin),
         "first alert": row.alerts[0] if row.alerts else "",
         "fault": row.fault,
-        "drive": f"{row.scenario}, {row.trigger}",
+        "drive": f"{row.scenario_label}, {row.trigger}",
         "sentence": row.sentence,
     }
 

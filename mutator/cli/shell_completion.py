@@ -89,9 +89,9 @@ def complete_gates(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def complete_plan_columns(ctx: typer.Context, incomplete: str) -> list[str]:
-    from mutator.results.plan_columns import PLAN_COLUMN_NAMES
+    from mutator.results.plan_columns import plan_column_names
 
-    return _expressions_with_column(PLAN_COLUMN_NAMES, incomplete)
+    return _expressions_with_column(plan_column_names(), incomplete)
 
 
 def complete_result_columns(ctx: typer.Context, incomplete: str) -> list[str]:

@@ -8,7 +8,7 @@ from mutator.campaigns.row_filters import matching_items
 from mutator.model import Experiment, Record, Value
 from mutator.preflight import equivalence_check
 from mutator.results.experiment_sentence import ExperimentSentences
-from mutator.results.plan_columns import PLAN_COLUMN_NAMES, plan_row
+from mutator.results.plan_columns import columns_of_plan, plan_row
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import frame_of_experiments
 from mutator.results.worst_first_ranking import worst_first_ranks
@@ -70,7 +70,9 @@ def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
     equivalence_check.compare_sample(folder, records)
     experiments = tuple(plan_file.load_experiments(folder.path))
     if only:
-        experiments = tuple(matching_items(experiments, only, PLAN_COLUMN_NAMES, plan_row))
+        columns = columns_of_plan(folder.head.families)
+        names = [column.name for column in columns]
+        experiments = tuple(matching_items(experiments, only, names, lambda e: plan_row(e, columns)))
     faults = {e.fault.id: e.fault for e in experiments}
     sentences = ExperimentSentences.of_run(folder.head)
     frame = frame_of_experiments(folder, experiments)

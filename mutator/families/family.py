@@ -10,6 +10,7 @@ from jinja2 import Template, TemplateError, TemplateSyntaxError
 from mutator._common.message_text import describe_choices, spelling_suggestion
 from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
+from mutator.families.family_facts import FamilyFacts
 from mutator.families.parameters import Parameter, ParameterValue
 from mutator.model import ConcreteScenario
 from mutator.mutants.restricted_template_language import TemplateEnvironment
@@ -42,6 +43,12 @@ class Family:
     frequency: Frequency | None
     template: str
     yaml_source: YamlSource
+
+    @property
+    def facts(self) -> FamilyFacts:
+        """What a run states about the family."""
+        parameters = tuple(parameter.facts for parameter in self.parameters)
+        return FamilyFacts(name=self.name, title=self.title, parameters=parameters)
 
     def concrete(self, values: Sequence[ParameterValue]) -> ConcreteScenario:
         """Return the scenario with these values, one for each parameter in order.

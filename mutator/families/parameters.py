@@ -10,6 +10,7 @@ from statistics import NormalDist
 
 from mutator._common.message_text import describe_choices
 from mutator.config.units import UNITS, Unit, convert_unit
+from mutator.families.family_facts import ParameterFacts
 
 ParameterValue = int | float | str
 
@@ -77,8 +78,13 @@ class Parameter:
 
     def describe(self, value: ParameterValue) -> str:
         """Return the value with name and unit: `ego 60 km/h`."""
-        text = value if isinstance(value, str) else f"{value:g}"
-        return f"{self.name} {text}" + (f" {self.unit.symbol}" if self.unit else "")
+        return self.facts.describe(value)
+
+    @property
+    def facts(self) -> ParameterFacts:
+        """What a run states about the parameter."""
+        symbol = self.unit.symbol if self.unit else ""
+        return ParameterFacts(key=self.key, name=self.name, unit=symbol, is_text=not self.is_number)
 
     def parse(self, text: str) -> ParameterValue | None:
         """Return the value in `text`; None unless it is one of the values, or within a range."""

@@ -1,7 +1,7 @@
 """Draws concrete scenarios from a family: reproducibly, without duplicates, within its constraints."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 
 import numpy as np
@@ -10,6 +10,7 @@ from mutator._common.message_text import counted
 from mutator._common.random_streams import random_generator
 from mutator.errors import MutatorError
 from mutator.families.family import Family
+from mutator.families.parameters import ParameterValue
 from mutator.model import ConcreteScenario
 
 _Indices = tuple[int, ...]  # the index of each parameter's value
@@ -41,11 +42,20 @@ def sample_scenarios(
     return scenarios
 
 
-def probability_of_draw(family: Family, indices: Sequence[int]) -> float:
-    """Return how likely one draw gives these values, relative to others of the family."""
-    return math.prod(
-        parameter.probability(index) for parameter, index in zip(family.parameters, indices, strict=True)
-    )
+def frequency_weight(family: Family, values: Mapping[str, ParameterValue], method: str) -> float:
+    """Return how often these values (by key) occur on the road, relative to how often `method` draws them.
+
+    Parameters without a frequency are taken to occur as they are drawn. ValueError for values that the family
+    does not draw.
+    """
+    weight = 1.0
+    for parameter in family.parameters:
+        probabilities = family.frequency.probabilities.get(parameter.name) if family.frequency else None
+        if probabilities is not None:
+            index = list(parameter.values).index(values[parameter.key])
+            drawn = 1 / len(parameter.values) if method == "grid" else parameter.probability(index)
+            weight *= probabilities[index] / drawn
+    return weight
 
 
 def _values_at(family: Family, indices: Sequence[int]) -> list[int | float | str]:

@@ -8,6 +8,7 @@ import pandas as pd
 
 from mutator.figures import propagation_time_figure
 from mutator.figures.golden_and_faulty_plot import render_images
+from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.statistics.results_frame import select_common_columns
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ class Drawing:
 def draw_figures(frame: pd.DataFrame) -> tuple[Drawing, ...]:
     """Return the figures that show what no part of the report's page shows; empty without a comparison."""
     frame = select_common_columns(frame)
-    return (_draw_propagation_times(frame),) if frame["scenario"].nunique() > 1 else ()
+    return (_draw_propagation_times(frame),) if families_or_scenarios_of(frame).nunique() > 1 else ()
 
 
 def drawing_files(drawings: Sequence[Drawing]) -> dict[str, bytes]:

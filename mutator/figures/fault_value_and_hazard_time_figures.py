@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from mutator.figures import figure_style
+from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.statistics.event_time_statistics import share_of_hazards_within
 
 if TYPE_CHECKING:
@@ -31,11 +32,13 @@ LabelledLimits = Sequence[tuple[float, str]]
 def draw_values(
     points: pd.DataFrame, *, title: str, x_label: str, y_label: str, limits: LabelledLimits
 ) -> "Figure":
-    """Draw a mark for each row of `points`: `value` and `y`, with `scenario` as colour and shape, filled if
+    """Draw a mark for each row of `points`: `value` and `y`, with the scenario, or its family, as
+    colour and shape, filled if
     `is_hazard`. Each of the `limits` is a height and its words.
     """
     figure, [axis] = figure_style.blank_figure(4.5, 1, 1)
-    for number, (scenario, group) in enumerate(points.groupby("scenario", sort=True, observed=True)):
+    scenarios = families_or_scenarios_of(points)
+    for number, (scenario, group) in enumerate(points.groupby(scenarios, sort=True, observed=True)):
         colour, marker = (
             _SCENARIO_COLOURS[number % len(_SCENARIO_COLOURS)],
             _SCENARIO_MARKERS[number % len(_SCENARIO_MARKERS)],

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mutator.figures import figure_style
+from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.statistics.event_time_statistics import TimeSpread, propagation_spreads_by_step
 
 if TYPE_CHECKING:
@@ -15,9 +16,10 @@ if TYPE_CHECKING:
 
 @figure_style.shipped_style()
 def draw_times_by_scenario(frame: pd.DataFrame) -> "Figure":
-    methods, scenarios = sorted(frame["method"].unique()), sorted(frame["scenario"].unique())
+    names = families_or_scenarios_of(frame)
+    methods, scenarios = sorted(frame["method"].unique()), sorted(names.unique())
     spreads = {
-        (m, s): propagation_spreads_by_step(group) for (m, s), group in frame.groupby(["method", "scenario"])
+        (m, s): propagation_spreads_by_step(group) for (m, s), group in frame.groupby(["method", names])
     }
     steps = list(next(iter(spreads.values())))
     figure, axes = figure_style.blank_figure(6.2, 2, 2)

@@ -1,7 +1,10 @@
 """The hazards, alerts and channel ranges of a run folder's fault-free runs."""
 
-from collections.abc import Iterable, Sequence
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from statistics import median
 
 import numpy as np
 
@@ -9,15 +12,20 @@ from mutator._common.table_rendering import TextTable
 from mutator.outcomes.hazard_and_metric_judgement import judge_run
 from mutator.outcomes.trace_and_record_loading import load_target_record, load_trace
 from mutator.store.golden_runs import GoldenRun
+from mutator.store.planned_scenarios import planned_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 
+MOST_LISTED_OF_FAMILY = 10  # fault-free runs of a family in a table
+MARGIN_PREFIX = "margin_"  # of the metrics that are margins of hazards
 EventTimes = tuple[tuple[str, float], ...]  # (name, simulated time in s)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultFreeRun:
     scenario: str
+    scenario_label: str  # the scenario, or its family and values
+    family: str  # the family that gave the scenario; '' for one of the library
     changes: tuple[str, ...]
     seed: int | None  # None: the seed of the run folder
     hazards: EventTimes
@@ -25,34 +33,48 @@ class FaultFreeRun:
     channel_ranges: tuple[
         tuple[str, float, float], ...
     ]  # name, minimum and maximum of recorded plotted channels
+    metrics: tuple[tuple[str, float], ...]  # metrics of the manifest and margins of its hazards
+
+    @property
+    def margins(self) -> dict[str, float]:
+        """The margins of hazards."""
+        return {name: value for name, value in self.metrics if name.startswith(MARGIN_PREFIX)}
 
 
 def load_fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
     """Return the fault-free runs of a run folder, sorted by name. MutatorError if one cannot be read."""
+    planned = planned_scenarios_of(folder.path)
     runs = []
     for golden_run in sorted(folder.kept_goldens):
         run_folder = folder.golden_folder(*golden_run)
+        of_family = planned.by_name.get(golden_run.scenario) if planned else None
+        concrete = of_family.scenario if of_family else None
         trace = load_trace(manifest, run_folder)
         judged = judge_run(manifest, trace, load_target_record(manifest, run_folder))
         plotted = [channel.name for channel in manifest.non_actuator_channels if channel.name in trace]
         runs.append(
             FaultFreeRun(
                 **golden_run._asdict(),
+                scenario_label=f"{concrete.family}, {concrete.label}" if concrete else golden_run.scenario,
+                family=concrete.family if concrete else "",
                 hazards=judged.hazards,
                 alerts=judged.alerts,
                 channel_ranges=tuple((name, *_finite_range(trace[name])) for name in plotted),
+                metrics=judged.metrics,
             )
         )
     return tuple(runs)
 
 
 def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> TextTable:
-    """Return the table of fault-free runs: first times of hazards and alerts, and channel ranges."""
+    """Return the table of fault-free runs: first times of hazards and alerts, and channel ranges. Of each
+    family, it has the worst runs.
+    """
     channels = list(dict.fromkeys(name for run in runs for name, _, _ in run.channel_ranges))
     rows = []
-    for run in runs:
+    for run in _listed_runs(runs):
         ranges = {name: f"{least:.4g} to {largest:.4g}" for name, least, largest in run.channel_ranges}
-        key = GoldenRun(run.scenario, run.changes, run.seed).key
+        key = GoldenRun(run.scenario_label, run.changes, run.seed).key
         events = (
             [_describe_first_times(run.alerts), _describe_first_times(run.hazards)]
             if alerts
@@ -63,12 +85,44 @@ def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Te
     return TextTable(heads=["fault-free run", *events, *channels], rows=rows)
 
 
+def _listed_runs(runs: Sequence[FaultFreeRun]) -> Iterator[FaultFreeRun]:
+    """Yield the runs in scenarios of the library, then the worst of each family."""
+    yield from (run for run in runs if not run.family)
+    for family in sorted({run.family for run in runs if run.family}):
+        yield from _worst_first([run for run in runs if run.family == family])[:MOST_LISTED_OF_FAMILY]
+
+
+def _worst_first(runs: Sequence[FaultFreeRun]) -> list[FaultFreeRun]:
+    """Sort runs by hazards, then by the smallest margin, as a multiple of its median, because margins have
+    different units, then by alerts.
+    """
+    names = sorted({name for run in runs for name in run.margins})
+    medians = {name: median(run.margins[name] for run in runs if name in run.margins) for name in names}
+
+    def badness(run: FaultFreeRun) -> tuple[int, float, int]:
+        shares = [value / medians[name] for name, value in run.margins.items() if medians[name] > 0]
+        return (-len(run.hazards), min(shares, default=math.inf), -len(run.alerts))
+
+    return sorted(runs, key=badness)
+
+
+def unlisted_runs_note(runs: Iterable[FaultFreeRun]) -> str:
+    """Return a sentence on the runs that `fault_free_table` leaves out; '' if none."""
+    counts = Counter(run.family for run in runs if run.family)
+    parts = [
+        f"{family}: the {MOST_LISTED_OF_FAMILY} worst of {count}"
+        for family, count in sorted(counts.items())
+        if count > MOST_LISTED_OF_FAMILY
+    ]
+    return f"Of families, the table has the worst runs ({'; '.join(parts)})." if parts else ""
+
+
 def fault_free_alerts_note(runs: Iterable[FaultFreeRun]) -> str:
     """Return a note on the alerts that fault-free runs raise, for tables that count alerts; '' if none."""
     scenarios: dict[str, dict[str, None]] = {}
     for run in runs:
         for name, _ in run.alerts:
-            scenarios.setdefault(name, {})[run.scenario] = None
+            scenarios.setdefault(name, {})[run.family or run.scenario] = None
     if not scenarios:
         return ""
     alert_texts = "; ".join(f"{name} in {', '.join(scenarios[name])}" for name in sorted(scenarios))

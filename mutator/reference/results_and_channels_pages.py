@@ -6,7 +6,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.results.columns_of_golden_hazards import golden_class_columns
 from mutator.results.csv_and_parquet_writers import ARROW_TYPE_BY_COLUMN_TYPE, TableColumn
-from mutator.results.plan_columns import PLAN_COLUMN_NAMES
+from mutator.results.plan_columns import plan_column_names
 from mutator.results.propagation_columns import PROPAGATION_COLUMNS as PROPAGATION
 from mutator.results.severity_and_sentence_columns import severity_and_time_columns
 from mutator.results.table_columns import TIMING_COLUMNS, result_columns
@@ -20,7 +20,7 @@ from mutator.workspace import Workspace
 
 
 def render_results_page(workspace: Workspace) -> str:
-    left_out = ", ".join(f"`{name}`" for name in PLAN_COLUMN_NAMES)
+    left_out = ", ".join(f"`{name}`" for name in plan_column_names())
     manifests = [workspace.manifest(name) for name in workspace.targets]
     return "\n".join(
         [
@@ -35,9 +35,13 @@ def render_results_page(workspace: Workspace) -> str:
             "has two columns:\nits name in lower case, and `t_` with that name. A channel has one column: "
             "`max_dev_` with the first word of its\nname, or with its whole name if two channels start with "
             "the same word. Margins of hazards and metrics have the\nnames that the manifest gives them.\n",
+            "A run with scenarios of [families](family.md) has the column `family`, and one for each "
+            "parameter, with its key as name\n(`ego_kph`). They are empty for other scenarios. `scenario` "
+            "is then the family and the beginning of a digest.\n",
             *(line for manifest in manifests for line in _result_columns_section(manifest)),
             "## plan.csv\n",
-            f"`plan.csv` has the columns that are known before a run: {left_out}.\n",
+            f"`plan.csv` has the columns that are known before a run: {left_out}.\n"
+            "With families, `family` and the parameters follow, except in a bench.\n",
             "## propagation.parquet\n",
             "One row for each channel of an experiment that differed from the golden run by more than its "
             "tolerance, in the order of\nexperiments and of the manifest's channels. [Fault "

@@ -118,7 +118,9 @@ def describe_hazards(workspace: Workspace, manifest: TargetManifest) -> dict[str
 
 def _film_title(experiment: Experiment) -> str:
     trigger = f"{experiment.trigger.name}: {experiment.trigger.condition}".removesuffix(": True")
-    return "   ".join((experiment.fault.label, " ".join((experiment.scenario, *experiment.changes)), trigger))
+    return "   ".join(
+        (experiment.fault.label, " ".join((experiment.scenario_label, *experiment.changes)), trigger)
+    )
 
 
 def _film_events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, object]:

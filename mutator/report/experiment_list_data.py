@@ -31,6 +31,7 @@ from mutator.report.source_lines_with_outcomes import SourceLines
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.outcome_counting import (
     checked_hazard_names,
+    families_or_scenarios_of,
     fault_types_of,
     first_hazard_times,
     joined_occurred_hazards,
@@ -184,7 +185,8 @@ def results_table_data(
     source: SourceLines | None = None,
     sentences: ExperimentSentences | None = None,
 ) -> dict[str, Any]:
-    """Return the results by column, with derived columns such as `rank` (1: the worst). Alert columns need a
+    """Return the results by column, with derived columns such as `rank` (1: the worst). In `scenario`, those
+    of a family have its name, so that filters and maps count them as one. Alert columns need a
     target with `alerts`; `line` (of the fault) and `lasting` need a `source`. `faults` are those of the plan.
     """
     omitted_columns = {RANK_COLUMN, UNTIMED_PATH_COLUMN, *(() if has_alerts else _ALERT_COLUMNS)}
@@ -192,6 +194,8 @@ def results_table_data(
         str(name): results[name] for name in results.columns if name not in omitted_columns
     }
     columns["kind"] = fault_types_of(results)
+    if families := results.attrs.get("families"):
+        columns |= {"scenario": families_or_scenarios_of(results), "concrete_scenario": results["scenario"]}
     rows = rows_of(results, faults, sentences)
     columns["sentence"] = [row.sentence for row in rows]
     columns["fault"] = [row.fault for row in rows]
@@ -213,6 +217,7 @@ def results_table_data(
         "count": len(results),
         "checked": checked_hazards,
         "labels": labels,
+        **({"families": as_json_types(families)} if families else {}),
         "columns": columns_data,
     }
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mutator.report.reported_run import ReportedRun
+from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL
 from mutator.targets.hazard_severity import SEVERITY_CLASSES
@@ -17,11 +18,16 @@ HeatMapCells = list[list[Any]]  # by row; each cell has a count or value, and it
 
 
 def build_heat_map(run: ReportedRun) -> dict[str, Any]:
-    """Return the fault types, scenarios, and cells by measure. The last row and column are totals."""
+    """Return the fault types, scenarios (those of a family are one), and cells by measure. The last row and
+    column are totals.
+    """
     frame = run.frame
-    kinds, scenarios = (sorted(map(str, frame[name].unique())) for name in ("kind", "scenario"))
-    categories = (("kind", kinds), ("scenario", scenarios))
-    y, x = (pd.Categorical(frame[name], categories=of).codes.astype(np.int64) for name, of in categories)
+    columns = (frame["kind"], families_or_scenarios_of(frame))
+    kinds, scenarios = (sorted(map(str, column.unique())) for column in columns)
+    y, x = (
+        pd.Categorical(column, categories=names).codes.astype(np.int64)
+        for column, names in zip(columns, (kinds, scenarios), strict=True)
+    )
     shape = (len(kinds) + 1, len(scenarios) + 1)
     cells: dict[str, HeatMapCells] = {}
     for name, part, of in _share_and_base_row_masks(frame, has_alerts=run.folder.has_alerts):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mutator._common.hashing import as_json_types
+from mutator.families.family_facts import FamilyFacts
 from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.report.experiment_facts import RANK_COLUMN
 from mutator.report.experiment_list_data import details_data, results_table_data
@@ -43,6 +44,7 @@ class ViewedTarget:
     scale: SeverityScale | None
     has_alerts: bool
     scene: dict[str, Any] | None
+    families: Sequence[FamilyFacts] = ()
 
     @classmethod
     def of_run(cls, folder: RunFolder, manifest: TargetManifest | None) -> "ViewedTarget":
@@ -58,17 +60,27 @@ class ViewedTarget:
             scale=head.severity,
             has_alerts=bool(head.alerts),
             scene=scene_as_json(manifest) if manifest else None,
+            families=head.families,
         )
 
     @classmethod
     def of_manifest(
-        cls, manifest: TargetManifest, scale: SeverityScale | None, phrases: Phrases
+        cls,
+        manifest: TargetManifest,
+        scale: SeverityScale | None,
+        phrases: Phrases,
+        families: Sequence[FamilyFacts],
     ) -> "ViewedTarget":
         compared, metrics = [channel.name for channel in manifest.compared_channels], metric_facts(manifest)
         severity = severity_and_time_columns(has_classes=scale is not None)
         return cls(
             columns=result_columns(
-                manifest.hazard_names, compared, metrics, severity, speed=bool(manifest.speed)
+                manifest.hazard_names,
+                compared,
+                metrics,
+                severity,
+                families=families,
+                speed=bool(manifest.speed),
             ),
             sentences=ExperimentSentences.of_target(manifest, phrases, scale),
             hazards=hazard_facts(manifest),
@@ -78,6 +90,7 @@ class ViewedTarget:
             scale=scale,
             has_alerts=bool(manifest.alerts),
             scene=scene_as_json(manifest),
+            families=families,
         )
 
 
@@ -90,7 +103,8 @@ def experiment_view_data(
 ) -> dict[str, Any]:
     """Return the table of one row, its details, facts about the target, and the encoded series."""
     experiment, record = finished.experiment, finished.record
-    frame = frame_of_finished(target.columns, [finished], target.hazard_names).assign(**{RANK_COLUMN: 0})
+    frame = frame_of_finished(target.columns, [finished], target.hazard_names, target.families)
+    frame = frame.assign(**{RANK_COLUMN: 0})
     table = results_table_data(
         frame,
         {experiment.fault.id: experiment.fault},

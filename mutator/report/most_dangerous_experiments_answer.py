@@ -152,7 +152,7 @@ def _experiment_link(row: Mapping[Any, Any], filtered_list: str) -> PageLink:
     """Return the link to an experiment: what happened and, below, its fault with value, scenario and trigger.
     Without a sentence, the fault is the link.
     """
-    place = f"in {row['scenario']}, trigger {row['trigger']}"
+    place = f"in {row['scenario_label']}, trigger {row['trigger']}"
     sentence = row["sentence"]
     return PageLink(
         sentence or row["fault"],

@@ -67,6 +67,7 @@ def _frame_for_answers(run: ReportedRun) -> pd.DataFrame:
     listed_columns: dict[str, dict[str, Any]] = {
         "fault": {row.experiment_id: row.fault for row in rows},
         "sentence": {row.experiment_id: row.sentence for row in rows},
+        "scenario_label": {row.experiment_id: row.scenario_label for row in rows},
         "hazard_names": {row.experiment_id: tuple(name for name, _ in row.hazards) for row in rows},
         "margins": {row.experiment_id: row.margins for row in rows},
         "warned": {row.experiment_id: _describe_first_alert(row) for row in rows},

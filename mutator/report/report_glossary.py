@@ -6,6 +6,7 @@ from mutator.config.yaml_files import load_yaml
 from mutator.errors import MutatorError
 from mutator.model import Method
 from mutator.report.reported_run import ReportedRun
+from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.targets.hazard_severity import SeverityScale
 
 Glossary = Mapping[str, Mapping[str, str]]  # heading -> term -> meaning
@@ -101,8 +102,10 @@ def _severity_meanings(scale: SeverityScale | None, *, in_words: bool = False) -
 
 
 def _scenario_meanings(run: ReportedRun) -> dict[str, str]:
-    names = sorted(run.results["scenario"].unique())
-    return {name: about for name in names if (about := _scenario_title(run, name))}
+    title_by_family = {family.name: family.title for family in run.folder.head.families}
+    names = sorted(families_or_scenarios_of(run.results).unique())
+    titles = {name: title_by_family.get(name) or _scenario_title(run, name) for name in names}
+    return {name: about for name, about in titles.items() if about}
 
 
 def _scenario_title(run: ReportedRun, name: str) -> str:

@@ -52,6 +52,8 @@ class ReportedRun:
     faults: Mapping[str, Fault] = field(default_factory=dict)
     experiments: Mapping[str, Experiment] = field(default_factory=dict)
     records: Mapping[str, Record] = field(default_factory=dict)
+    # empty until they are read: a run can have thousands
+    _loaded_fault_free_runs: list[tuple[FaultFreeRun, ...]] = field(default_factory=list)
 
     @classmethod
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
@@ -95,13 +97,16 @@ class ReportedRun:
         return int((~self.results["status"].isin(not_run)).sum())
 
     def fault_free_runs(self) -> tuple[FaultFreeRun, ...]:
-        """Return the alerts, hazards and ranges of the golden runs; empty if these cannot be read."""
+        """Return what is known of the golden runs; empty if these cannot be read."""
         if self.workspace is None:
             return ()
-        try:
-            return load_fault_free_runs(self.folder, self.workspace.manifest(self.folder.head.target))
-        except (MutatorError, KeyError):
-            return ()
+        if not self._loaded_fault_free_runs:
+            try:
+                manifest = self.workspace.manifest(self.folder.head.target)
+                self._loaded_fault_free_runs.append(load_fault_free_runs(self.folder, manifest))
+            except (MutatorError, KeyError):
+                self._loaded_fault_free_runs.append(())
+        return self._loaded_fault_free_runs[0]
 
     def latest_golden_end_by_scenario(self) -> dict[str, float] | None:
         """Return the latest end of each scenario's golden runs, in simulated seconds; None if one cannot be

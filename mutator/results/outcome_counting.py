@@ -99,6 +99,13 @@ def fault_types_of(frame: "pd.DataFrame") -> "pd.Series[str]":
     return frame["module"] + "/" + frame["fault_type"]
 
 
+def families_or_scenarios_of(frame: "pd.DataFrame") -> "pd.Series[str]":
+    """Return the family that gave the scenario of each row, or the scenario of the library."""
+    if "family" not in frame:
+        return frame["scenario"]
+    return frame["family"].where(frame["family"] != "", frame["scenario"])
+
+
 def count_outcomes_by_group(frame: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[GroupCount, ...]:
     """Return a count for each of the `groups`, sorted by name, then the total."""
     import pandas as pd

@@ -2,11 +2,12 @@
 how a cell follows from an experiment.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from mutator.families.family_facts import FamilyFacts, ParameterFacts, merged_parameters
 from mutator.model import Experiment, Fault, Hold, Value, fault_label
-from mutator.results.csv_and_parquet_writers import TableColumn
+from mutator.results.csv_and_parquet_writers import ColumnType, TableColumn
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +65,13 @@ FIRST_PLAN_COLUMNS = (
         "the unit of `value` as the spec states it, `-` for a plain number",
         lambda e: e.fault.unit,
     ),
-    PlanColumn("scenario", "text", "", "the scenario", lambda e: e.scenario),
+    PlanColumn(
+        "scenario",
+        "text",
+        "",
+        "the scenario; of a family, the name with the beginning of its digest",
+        lambda e: e.scenario,
+    ),
     PlanColumn(
         "method",
         "text",
@@ -108,10 +115,43 @@ HOLD_COLUMNS = (  # of results.csv alone
         lambda e: e.trigger.hold_s if _experiment_hold(e) is Hold.FOR else None,
     ),
 )
-_ALL_PLAN_COLUMNS = (*FIRST_PLAN_COLUMNS, *LAST_PLAN_COLUMNS)
-PLAN_COLUMN_NAMES = tuple(column.name for column in _ALL_PLAN_COLUMNS)
+FAMILY_COLUMN = PlanColumn(
+    "family",
+    "text",
+    "",
+    "the family that gave the scenario; empty for a scenario of the library",
+    lambda e: e.concrete.family if e.concrete else None,
+)
+_COMMON_PLAN_COLUMNS = (*FIRST_PLAN_COLUMNS, *LAST_PLAN_COLUMNS)
 
 
-def plan_row(experiment: Experiment) -> dict[str, object]:
+def family_columns(families: Sequence[FamilyFacts]) -> tuple[PlanColumn, ...]:
+    """Return the columns of a run with scenarios of these families: the family, and each parameter."""
+    return (FAMILY_COLUMN, *map(_parameter_column, merged_parameters(families))) if families else ()
+
+
+def _parameter_column(parameter: ParameterFacts) -> PlanColumn:
+    about = f"the scenario's {parameter.name.replace('_', ' ')}; empty if its family has no such parameter"
+    column_type: ColumnType = "text" if parameter.is_text else "number"
+
+    def cell_of(experiment: Experiment) -> object:
+        value = experiment.concrete.values.get(parameter.key) if experiment.concrete else None
+        return str(value) if parameter.is_text and value is not None else value
+
+    return PlanColumn(parameter.key, column_type, parameter.unit, about, cell_of)
+
+
+def columns_of_plan(families: Sequence[FamilyFacts] = ()) -> tuple[PlanColumn, ...]:
+    """Return the columns of plan.csv, in order."""
+    return (*_COMMON_PLAN_COLUMNS, *family_columns(families))
+
+
+def plan_column_names(families: Sequence[FamilyFacts] = ()) -> tuple[str, ...]:
+    return tuple(column.name for column in columns_of_plan(families))
+
+
+def plan_row(
+    experiment: Experiment, columns: Sequence[PlanColumn] = _COMMON_PLAN_COLUMNS
+) -> dict[str, object]:
     """Return the cells of an experiment by column. If the fault's value is text, it is part of `variant`."""
-    return {column.name: column.cell_of(experiment) for column in _ALL_PLAN_COLUMNS}
+    return {column.name: column.cell_of(experiment) for column in columns}

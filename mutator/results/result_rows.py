@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
+from mutator.families.family_facts import FamilyFacts
 from mutator.model import Fault, Outcome, Status, Value, fault_label
 from mutator.results.columns_of_golden_hazards import GOLDEN_CLASS
 from mutator.results.experiment_sentence import ExperimentSentences
@@ -34,6 +35,7 @@ class ResultRow:
     value: Value  # with the digits of the plan; None without a value, and if it is text
     unit: str
     scenario: str
+    scenario_label: str  # the scenario, or its family and values: `follow, ego 60 km/h, gap 20 m`
     trigger: str
     status: Status
     outcome: Outcome | None
@@ -90,9 +92,17 @@ def rows_of(
     """
     lines = cells_by_row(frame.assign(kind=fault_types_of(frame), ending=outcome_or_status_of_rows(frame)))
     hazards, margins = _cells_with_value(first_hazard_times(frame)), _cells_with_value(hazard_margins(frame))
+    families = {family.name: family for family in frame.attrs.get("families", ())}
     rows = zip(lines, hazards, margins, strict=True)
     return [
-        _build_row(cells, row_hazards, row_margins, faults.get(cells["fault_id"]), sentences)
+        _build_row(
+            cells,
+            row_hazards,
+            row_margins,
+            faults.get(cells["fault_id"]),
+            sentences,
+            families.get(cells.get("family", "")),
+        )
         for cells, row_hazards, row_margins in rows
     ]
 
@@ -112,6 +122,7 @@ def _build_row(
     margins: tuple[tuple[str, float], ...],
     fault: Fault | None,
     sentences: ExperimentSentences | None,
+    family: FamilyFacts | None,
 ) -> ResultRow:
     return ResultRow(
         experiment_id=cells["experiment_id"],
@@ -120,6 +131,7 @@ def _build_row(
         value=numeric_value_of(fault) if fault else cells["value"],
         unit=cells["unit"],
         scenario=cells["scenario"],
+        scenario_label=family.describe(cells) if family else cells["scenario"],
         trigger=cells["trigger"],
         status=Status(cells["status"]),
         outcome=Outcome(cells["outcome"]) if cells["outcome"] else None,

@@ -158,7 +158,8 @@ def _inputs_digest(folder: RunFolder) -> str:
         (column.name, column.type)
         for column in (*result_columns_of(folder), *propagation_columns.PROPAGATION_COLUMNS, *TIMING_COLUMNS)
     ]
-    return digest([STAMP_SCHEMA, VERSION, *head_facts, columns, input_digests])
+    scenarios = [head.scenarios] if head.scenarios else []
+    return digest([STAMP_SCHEMA, VERSION, *head_facts, columns, input_digests, *scenarios])
 
 
 def _current_table_digests(folder: RunFolder) -> dict[str, str | None]:

@@ -9,11 +9,19 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
+from mutator.families.family_facts import FamilyFacts
 from mutator.outcomes.verdict_rules import reaction_time
 from mutator.results.columns_of_golden_hazards import AGAINST_GOLDEN, GOLDEN_CLASS, golden_class_columns
 from mutator.results.csv_and_parquet_writers import TableColumn
 from mutator.results.finished_experiments_and_columns import FinishedExperiment, ResultColumn, rounded_time
-from mutator.results.plan_columns import FIRST_PLAN_COLUMNS, HOLD_COLUMNS, LAST_PLAN_COLUMNS, PlanColumn
+from mutator.results.plan_columns import (
+    FAMILY_COLUMN,
+    FIRST_PLAN_COLUMNS,
+    HOLD_COLUMNS,
+    LAST_PLAN_COLUMNS,
+    PlanColumn,
+    family_columns,
+)
 from mutator.results.severity_and_sentence_columns import (
     FIRST_CHANGE_COLUMNS,
     SPEED_COLUMNS,
@@ -149,14 +157,15 @@ def result_columns(
     metrics: Sequence[MetricFacts] = (),
     severity: Sequence[ResultColumn] = (),
     *,
+    families: Sequence[FamilyFacts] = (),
     paths: bool = False,
     speed: bool = False,
     golden_classes: Sequence[ResultColumn] = (),
 ) -> tuple[PlanColumn | ResultColumn, ...]:
     """Return the columns of results.csv, in order.
 
-    `severity` is from `severity_columns`, `golden_classes` from `golden_class_columns`. `paths` adds the
-    columns of the fault's path, `speed` those of the car's speed.
+    `severity` is from `severity_columns`, `golden_classes` from `golden_class_columns`. `families` are those
+    of the run's scenarios. `paths` adds the columns of the fault's path, `speed` those of the car's speed.
     """
     ends = DRIVE_END_COLUMN in (metric.name for metric in metrics)
     return (
@@ -174,6 +183,7 @@ def result_columns(
         *severity,
         *(PATH_COLUMNS if paths else ()),
         *LAST_PLAN_COLUMNS,
+        *family_columns(families),
         *HOLD_COLUMNS,
         *FIRST_CHANGE_COLUMNS,
         *(SPEED_COLUMNS if speed else ()),
@@ -192,6 +202,7 @@ def result_columns_of(folder: RunFolder) -> tuple[PlanColumn | ResultColumn, ...
         head.compared,
         head.metrics,
         severity,
+        families=head.families,
         paths=paths,
         speed=bool(head.speed),
         golden_classes=golden_class_columns(golden_hazards, several_seeds=folder.has_seeded_goldens)
@@ -306,17 +317,7 @@ def check_column_names(manifest: TargetManifest) -> None:
     """Raise MutatorError if a column of a hazard or metric has the name of another column, or if a metric's
     column could be taken for a hazard's.
     """
-    compared = [channel.name for channel in manifest.compared_channels]
-    used_names = {
-        column.name for column in result_columns((), compared, paths=True, speed=bool(manifest.speed))
-    }
-    used_names |= {column.name for column in severity_and_time_columns(has_classes=True)}
-    used_names |= {GOLDEN_CLASS, AGAINST_GOLDEN}
-    used_names |= {
-        *DERIVED_COLUMN_NAMES,
-        DRIVE_END_COLUMN,
-        *drive_deviation_column_by_channel(compared).values(),
-    }
+    used_names = _names_besides_definitions(manifest)
     is_mapping = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazard_names):
         names = {column.name for column in hazard_columns(hazard)}
@@ -337,3 +338,30 @@ def check_column_names(manifest: TargetManifest) -> None:
                 remedy="rename it",
             )
         used_names.add(metric.name)
+
+
+def check_parameter_names(manifest: TargetManifest, family: FamilyFacts) -> None:
+    """Raise MutatorError if a parameter of a family has the name of another column of this target."""
+    used_names = _names_besides_definitions(manifest) | {metric.name for metric in manifest.all_metrics}
+    used_names |= {column.name for name in manifest.hazard_names for column in hazard_columns(name)}
+    for parameter in family.parameters:
+        if parameter.key in used_names:
+            raise MutatorError(
+                f"parameter '{parameter.key}' of family {family.name} clashes with a column of the results",
+                expected="a name that no other column has",
+                remedy="rename it in the family file",
+            )
+
+
+def _names_besides_definitions(manifest: TargetManifest) -> set[str]:
+    """Return the names of the columns that follow from no hazard, metric or family."""
+    compared = [channel.name for channel in manifest.compared_channels]
+    columns = result_columns((), compared, paths=True, speed=bool(manifest.speed))
+    return {
+        *(column.name for column in (*columns, *severity_and_time_columns(has_classes=True), FAMILY_COLUMN)),
+        *DERIVED_COLUMN_NAMES,
+        DRIVE_END_COLUMN,
+        GOLDEN_CLASS,
+        AGAINST_GOLDEN,
+        *drive_deviation_column_by_channel(compared).values(),
+    }

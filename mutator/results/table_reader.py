@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bounded
 from mutator.errors import MutatorError
+from mutator.families.family_facts import FamilyFacts
 from mutator.model import Experiment, Outcome, Status
 from mutator.results import table_building
 from mutator.results.csv_and_parquet_writers import TableColumn, parquet_batch, parquet_schema
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.finished_experiments_and_columns import FinishedExperiment, ResultColumn
-from mutator.results.plan_columns import PlanColumn
+from mutator.results.plan_columns import FAMILY_COLUMN, PlanColumn
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_columns import cells_by_column, result_columns_of
 from mutator.store import plan_file
@@ -99,11 +100,12 @@ class Results:
 
     def frame(self, *names: str) -> "pd.DataFrame":
         """Return a frame with the types of results.parquet, of all columns or only those named. Without a
-        value, texts are '' and numbers NaN. `attrs["hazards"]` are the target's hazards.
+        value, texts are '' and numbers NaN. `attrs` has the target's `hazards` and the run's `families`.
         """
         data, folder = self.parquet(), RunFolder(self.run)
         columns = [column for column in result_columns_of(folder) if not names or column.name in names]
-        return typed_frame(self._load_checked_columns(data, columns), folder.head.hazards)
+        head = folder.head
+        return typed_frame(self._load_checked_columns(data, columns), head.hazards, head.families)
 
     def indexed_frame(self) -> "pd.DataFrame":
         """Return a frame of all columns for notebooks, indexed by experiment id.
@@ -124,7 +126,7 @@ class Results:
         frame["kind"] = (frame["module"] + "/" + frame["fault_type"]).astype("category")
         for name in (column.name for column in columns if column.type == "flag"):
             frame[name] = frame[name].astype("boolean")
-        for name in _CATEGORY_COLUMNS:
+        for name in (*_CATEGORY_COLUMNS, *((FAMILY_COLUMN.name,) if head.families else ())):
             frame[name] = frame[name].astype("category")
         for name, order in _ORDERED_VALUES_BY_COLUMN.items():
             frame[name] = pd.Categorical(frame[name], categories=order, ordered=True)
@@ -201,13 +203,15 @@ def frame_of_experiments(folder: RunFolder, experiments: Iterable[Experiment]) -
         for experiment in experiments
         if experiment.id in records
     )
-    return frame_of_finished(result_columns_of(folder), finished, folder.head.hazards)
+    head = folder.head
+    return frame_of_finished(result_columns_of(folder), finished, head.hazards, head.families)
 
 
 def frame_of_finished(
     columns: Sequence[PlanColumn | ResultColumn],
     finished: Iterable[FinishedExperiment],
     hazards: Iterable[str],
+    families: Iterable[FamilyFacts] = (),
 ) -> "pd.DataFrame":
     """Return the frame of experiments with their records, as from `Results.frame`."""
     import pyarrow as pa
@@ -215,10 +219,10 @@ def frame_of_finished(
     remaining = iter(finished)
     pieces = iter(lambda: list(islice(remaining, _EXPERIMENTS_PER_BATCH)), [])
     batches = [parquet_batch(columns, cells_by_column(columns, piece)) for piece in pieces]
-    return typed_frame(pa.Table.from_batches(batches, parquet_schema(columns)), hazards)
+    return typed_frame(pa.Table.from_batches(batches, parquet_schema(columns)), hazards, families)
 
 
-def typed_frame(table: Any, hazards: Iterable[str]) -> "pd.DataFrame":
+def typed_frame(table: Any, hazards: Iterable[str], families: Iterable[FamilyFacts] = ()) -> "pd.DataFrame":
     """Return a frame of a table with the types of results.parquet, as from `Results.frame`."""
     import pandas as pd
     import pyarrow as pa
@@ -230,7 +234,7 @@ def typed_frame(table: Any, hazards: Iterable[str]) -> "pd.DataFrame":
             column = pa.table([column[name].fill_null("")], [name])
         columns[name] = _to_pandas(column.combine_chunks())[name]
     frame = pd.DataFrame(columns)
-    frame.attrs["hazards"] = tuple(hazards)
+    frame.attrs |= {"hazards": tuple(hazards), "families": tuple(families)}
     return frame
 
 

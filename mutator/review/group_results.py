@@ -108,7 +108,7 @@ def _build_results(
 def _build_example(row: ResultRow, meaning_by_hazard: Mapping[str, str]) -> ExampleExperiment:
     return ExampleExperiment(
         id=row.experiment_id,
-        label=f"{row.fault}, {row.scenario}, {row.trigger}",
+        label=f"{row.fault}, {row.scenario_label}, {row.trigger}",
         ending=row.ending,
         verdict=describe_result(row, meaning_by_hazard),
     )

@@ -14,10 +14,12 @@ from pydantic import AfterValidator, Field, TypeAdapter
 from mutator._common.confined_files import check_only_plain_files
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import describe_choices, spelling_suggestion
+from mutator.campaigns.campaign_files import load_campaign
 from mutator.campaigns.row_filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
-from mutator.results.plan_columns import PLAN_COLUMN_NAMES
+from mutator.families.family_facts import FamilyFacts
+from mutator.results.plan_columns import plan_column_names
 from mutator.serve.page_tokens import TRIAL_PAGE, live_page_name, run_page_name
 from mutator.serve.served_runs import ServedRuns, report_address
 from mutator.serve.served_trials import TRIALS_FOLDER, check_value_declared
@@ -210,11 +212,16 @@ class RequestChecker:
         names = self.workspace.scenarios
         return [*names, scenario] if self.workspace.concrete_scenario(scenario) else names
 
+    def _families_of(self, campaign: str) -> list[FamilyFacts]:
+        """Return the families from which a campaign of the library draws scenarios."""
+        selections = load_campaign(self.workspace.campaign(campaign)).scenario_selections
+        return [self.workspace.family(item.family).facts for item in selections if not isinstance(item, str)]
+
     def _campaign_command(self, request: CampaignRequest) -> JobCommand:
         if request.campaign not in self.workspace.campaigns:
             raise _unknown_name_error("campaign", request.campaign, self.workspace.campaigns)
         if request.only is not None:
-            compile_filter(request.only, PLAN_COLUMN_NAMES)
+            compile_filter(request.only, plan_column_names(self._families_of(request.campaign)))
         folder = self._new_folder(request.name)
         self.runs.folders_by_key()  # the runs that are there come first
         if self.runs.reserved_key(folder) != request.name:

@@ -79,9 +79,11 @@ class ServedTrials:
     def _view(self, folder: Path, trial: StoredTrial, manifest: TargetManifest) -> dict[str, Any]:
         scale = self._workspace.scale_of(manifest)
         phrases = phrases_of_experiment(self._workspace, manifest, trial.experiment)
+        concrete = trial.experiment.concrete
+        families = [self._workspace.family(concrete.family).facts] if concrete else []
         patch = read_below(folder, "mutant.patch") if (folder / "mutant.patch").is_file() else None
         return experiment_view_data(
-            ViewedTarget.of_manifest(manifest, scale, phrases),
+            ViewedTarget.of_manifest(manifest, scale, phrases, families),
             FinishedExperiment(trial.experiment, trial.record, scale),
             patch,
             _encoded_series(folder, trial, manifest),

@@ -136,8 +136,8 @@ class WatchedRun:
 
     def _keep_worst(self, new_experiments: Iterable[FinishedExperiment]) -> None:
         """Keep the worst results. One that falls out cannot come back: later ones only push it down."""
-        candidates = [*self._worst, *new_experiments]
-        frame = frame_of_finished(self._columns, candidates, self._folder.head.hazards)
+        candidates, head = [*self._worst, *new_experiments], self._folder.head
+        frame = frame_of_finished(self._columns, candidates, head.hazards, head.families)
         order = worst_first_ranks(frame).argsort()[:MOST_ROWS].tolist()
         self._worst = [candidates[row] for row in order]
         faults = {finished.experiment.fault.id: finished.experiment.fault for finished in self._worst}
@@ -152,7 +152,7 @@ class WatchedRun:
             "severity": scale.labels.get(row.severity, "") if scale else "",
             "hazards": [name for name, _ in row.hazards],
             "fault": row.fault,
-            "scenario": row.scenario,
+            "scenario": row.scenario_label,
             "trigger": row.trigger,
             "sentence": row.sentence,
         }

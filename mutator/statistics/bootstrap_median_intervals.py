@@ -50,7 +50,7 @@ def _bootstrap_interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[
     block = _block_size(len(names), codes.size)
     sorted_samples = [_SortedBlocks(sample, codes, len(names), block) for sample in samples]
     draws = []
-    for counts in _draw_cluster_counts(len(names), max(codes.size // block + 1, block)):
+    for counts in draw_cluster_counts(len(names), max(codes.size // block + 1, block)):
         medians = [sample.medians(counts) for sample in sorted_samples]
         draws.append(medians[0] - medians[1] if len(medians) > 1 else medians[0])
     tail = (1 - CONFIDENCE_LEVEL) / 2
@@ -65,7 +65,7 @@ def _block_size(clusters: int, runs: int) -> int:
     return max(_MIN_BLOCK_SIZE, math.isqrt(clusters * runs // 50))
 
 
-def _draw_cluster_counts(cluster_count: int, other_cells_per_draw: int) -> Iterator[np.ndarray]:
+def draw_cluster_counts(cluster_count: int, other_cells_per_draw: int) -> Iterator[np.ndarray]:
     """Yield batches of shape (draws, clusters): how often each cluster is drawn. Each draw also needs memory
     for `others` cells.
     """

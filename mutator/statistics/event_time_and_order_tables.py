@@ -5,6 +5,7 @@ from dataclasses import astuple
 
 import pandas as pd
 
+from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.statistics import event_time_statistics
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
@@ -115,8 +116,10 @@ def hazard_orders_sheet(frame: pd.DataFrame) -> Sheet:
 
 
 def _groups_with_totals(frame: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """Yield the groups by method and scenario. After the scenarios of a method comes its total."""
+    """Yield the groups by method and scenario; scenarios of a family are one group. After the scenarios of a
+    method comes its total.
+    """
     for method, of_method in frame.groupby("method"):
-        for scenario, group in of_method.groupby("scenario"):
+        for scenario, group in of_method.groupby(families_or_scenarios_of(of_method)):
             yield str(method), str(scenario), group
         yield str(method), "total", of_method

@@ -52,6 +52,7 @@ _SHARED_COLUMNS = (
     "kind",
     "row",
     "scenario",
+    "family",
     "method",
     "trigger",
     "seed",

@@ -6,6 +6,8 @@ from typing import Any
 
 import pandas as pd
 
+from mutator.results.outcome_counting import families_or_scenarios_of
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tally:
@@ -48,7 +50,11 @@ def sum_tallies(tallies: Iterable[Tally]) -> Tally:
 
 
 def tally_by_scenario(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
-    return {(str(m), str(s)): tally_of_runs(group) for (m, s), group in frame.groupby(["method", "scenario"])}
+    """Return the counts by method and scenario; those of a family count as one."""
+    return {
+        (str(m), str(s)): tally_of_runs(group)
+        for (m, s), group in frame.groupby(["method", families_or_scenarios_of(frame)])
+    }
 
 
 def tally_by_fault_type(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:

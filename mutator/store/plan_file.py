@@ -26,7 +26,7 @@ from mutator.store.plan_lines import (
     read_plan_lines,
     values_hashed_into_id,
 )
-from mutator.store.planned_scenarios import planned_scenarios_of
+from mutator.store.planned_scenarios import PlannedScenarios, planned_scenarios_of
 
 EXPERIMENTS_FILE = "plan/experiments.jsonl"
 FAULTS_FILE = "plan/faults.jsonl"
@@ -200,9 +200,17 @@ def iterate_experiments(run: Path) -> Iterator[Experiment]:
 
 def _with_concrete_scenarios(run: Path, experiments: Iterable[Experiment]) -> Iterator[Experiment]:
     planned = planned_scenarios_of(run)
-    for experiment in experiments:
-        of_family = planned.by_name.get(experiment.scenario) if planned else None
-        yield replace(experiment, concrete=of_family.scenario) if of_family else experiment
+    return (with_concrete_scenario(experiment, planned) for experiment in experiments)
+
+
+def with_concrete_scenario(experiment: Experiment, planned: PlannedScenarios | None) -> Experiment:
+    """Return the experiment with its scenario, if that is one of the `planned` ones."""
+    of_family = planned.by_name.get(experiment.scenario) if planned else None
+    if of_family is None:
+        return experiment
+    with_scenario = replace(experiment, concrete=of_family.scenario)
+    vars(with_scenario)["id"] = experiment.id  # the scenario is not hashed into it
+    return with_scenario
 
 
 def parse_experiment_line(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:

@@ -9,6 +9,7 @@ from mutator.model import Experiment
 from mutator.store import plan_file
 from mutator.store.indexed_lines import OpenFiles
 from mutator.store.plan_lines import id_on_line, read_plan_lines
+from mutator.store.planned_scenarios import planned_scenarios_of
 
 
 class PlannedExperiments(Mapping[str, Experiment]):
@@ -20,6 +21,7 @@ class PlannedExperiments(Mapping[str, Experiment]):
     def __init__(self, run: Path) -> None:
         self._path = run / plan_file.EXPERIMENTS_FILE
         self._faults = plan_file.load_faults(run)
+        self._scenarios = planned_scenarios_of(run)
         self._files = OpenFiles([self._path])
         self._index: dict[str, int] = {}
         self._offsets = array("Q", [0])
@@ -36,7 +38,8 @@ class PlannedExperiments(Mapping[str, Experiment]):
         number = self._index[name]
         begin, end = self._offsets[number : number + 2]
         line = self._files.read_part(0, begin, end - begin)
-        return plan_file.parse_experiment_line(self._path, number + 1, line, self._faults)
+        experiment = plan_file.parse_experiment_line(self._path, number + 1, line, self._faults)
+        return plan_file.with_concrete_scenario(experiment, self._scenarios)
 
     def __contains__(self, name: object) -> bool:
         return name in self._index

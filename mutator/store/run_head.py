@@ -11,6 +11,7 @@ from mutator._common.hashing import added_field, as_json_types
 from mutator._common.library_and_run_folder_search import RUN_HEAD_FILE
 from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError, TypeMisfit
+from mutator.families.family_facts import FamilyFacts
 from mutator.model import GoldenClass, Limits
 from mutator.store.golden_runs import StoredGolden
 from mutator.store.plan_choices import Choices
@@ -77,6 +78,7 @@ class RunHead(TargetFacts, PlanFacts):
     phrases: Phrases = added_field(Phrases())
     goldens: tuple[StoredGolden, ...]
     scenarios: Sha256 | None = added_field(None)  # of plan/scenarios.jsonl, if families gave any scenario
+    families: tuple[FamilyFacts, ...] = added_field(())  # those whose scenarios are planned
     canary: Mapping[str, Any] | None
     canary_hazard: str | None
     sources: Mapping[str, Sha256]

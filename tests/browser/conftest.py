@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from mutator._common.hashing import digest
-from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan import Plan, build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.model import Experiment, ObservedActivation, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
@@ -26,6 +26,7 @@ from mutator.results import table_building
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.packed_patches import PatchWriter
 from mutator.store.records import RECORDS_SCHEMA
+from mutator.store.run_folder import RunFolder
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
 from mutator.workspace import Workspace
@@ -76,6 +77,25 @@ def record(experiment: Experiment, number: int, patch: bytes) -> Record:
     )
 
 
+def build_run(workspace: Workspace, out: Path) -> tuple[Plan, RunFolder]:
+    """Plan the campaign `toy`, and write synthetic records and the tables of its run folder."""
+    plan = build_plan(workspace, "toy")
+    folder = freeze_plan(plan, out, workspace)
+    manifest, models = workspace.manifest("toycar"), workspace.fault_models()
+    lines = LineWriter(
+        folder.path / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest}
+    )
+    patches = PatchWriter(folder.path, "0001-main")
+    for number, experiment in enumerate(plan.experiments):
+        data = build(manifest, models, experiment.fault, experiment.trigger).patch_bytes
+        lines.append(asdict(record(experiment, number, data)))
+        patches.append(experiment.id, data)
+    lines.close()
+    patches.close()
+    table_building.build_tables(folder.path)
+    return plan, folder
+
+
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
     """A run folder of 24 experiments with its report.
@@ -84,20 +104,8 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     """
     folder = tmp_path_factory.mktemp("browser")
     workspace = copy_toycar(folder)
-    plan = build_plan(workspace, "toy")
-    out = freeze_plan(plan, folder / "run", workspace)
-    manifest, models = workspace.manifest("toycar"), workspace.fault_models()
-    lines = LineWriter(
-        out.path / "records" / "0001-main.jsonl", {"schema": RECORDS_SCHEMA, "plan": plan.digest}
-    )
-    patches = PatchWriter(out.path, "0001-main")
-    for number, experiment in enumerate(plan.experiments):
-        data = build(manifest, models, experiment.fault, experiment.trigger).patch_bytes
-        lines.append(asdict(record(experiment, number, data)))
-        patches.append(experiment.id, data)
-    lines.close()
-    patches.close()
-    table_building.build_tables(out.path)
+    plan, out = build_run(workspace, folder / "run")
+    manifest = workspace.manifest("toycar")
     t = np.arange(0.0, 6.0, 0.05)
     names = ("gas", "brake", "wheel_turn", "gap", "speed")
     golden = {"time": t, **{name: np.sin(t + i) for i, name in enumerate(names)}}

@@ -72,6 +72,57 @@ def test_engines_and_sessions_give_the_same_bytes_in_a_family(families: Workspac
     assert mutator.verify(whole, workspace=families).differences == ()
 
 
+def test_tables_pages_and_filters_are_by_family(families: Workspace, tmp_path: Path) -> None:
+    """Scenarios of a family are one entry of tables and pages; their values are columns, also in filters."""
+    whole = mutator.plan("toy", workspace=families)
+    assert {"family", "ego_mps", "gap_m", "lead_mps"} <= set(whole.rows()[0])
+    ego_mps = max(row["ego_mps"] or 0 for row in whole.rows())
+    only = f'family == "follow" and ego_mps >= {ego_mps}'
+    run = mutator.run("toy", workspace=families, out=tmp_path / "run", choices=Choices(only=only))
+    frame = run.results
+    assert set(frame["ego_mps"]) == {ego_mps}
+    assert set(frame["family"]) == {"follow"}
+    head = (run.path / "plan.csv").read_text().splitlines()[0]
+    assert head.endswith(",condition,family,ego_mps,gap_m,lead_mps")
+    [scenario] = run.families.index
+    assert run.families.loc[scenario, ["ego_mps", "experiments", "golden_hazards"]].tolist() == [
+        ego_mps,
+        len(frame),
+        "",
+    ]
+    experiment = run.experiment(frame.index[0]).experiment
+    assert experiment.drive_label.startswith(f"follow, ego {ego_mps} m/s, gap ")
+    report = run.report().markdown.read_text()
+    assert "1 concrete scenario," in report
+    by_scenario = report.partition("## By scenario")[2].partition("## ")[0]
+    assert "| follow |" in by_scenario
+    assert scenario not in by_scenario
+    assert mutator.verify(run.path, workspace=families).differences == ()
+
+
+def test_frequencies_of_the_road_weigh_the_shares(families: Workspace, tmp_path: Path) -> None:
+    """A family with a `frequency` has weighted shares, as long as its file is as it was when planned."""
+    family, run = families.library / "families" / "follow.yaml", tmp_path / "run"
+    part = "{from: 14, to: 17, weight: 3}, {from: 17, to: 20, weight: 1}"
+    text = family.read_text().replace(
+        "template:", f"frequency: {{source: A count, of: {{ego_mps: [{part}]}}}}\ntemplate:"
+    )
+    family.write_text(text)
+    mutator.run("toy", workspace=families, out=run)
+    assert "weighted share" in mutator.load_run(run, workspace=families).report().markdown.read_text()
+    family.write_text(text.replace("weight: 3", "weight: 4"))
+    assert "weighted" not in mutator.load_run(run, workspace=families).report().markdown.read_text()
+
+
+def test_a_parameter_with_the_name_of_a_column_is_refused(families: Workspace) -> None:
+    family = families.library / "families" / "follow.yaml"
+    family.write_text(
+        family.read_text().replace("lead_mps", "status").replace("{{ lead_mps }}", "{{ status }}")
+    )
+    with pytest.raises(MutatorError, match="parameter 'status' of family follow clashes with a column"):
+        build_plan(families, "toy")
+
+
 def test_an_edited_scenario_is_found(families: Workspace, tmp_path: Path) -> None:
     run = tmp_path / "run"
     mutator.plan("toy", workspace=families, out=run)

@@ -203,7 +203,7 @@ def _joined_names(names: Sequence[str]) -> str:
 
 def _test_files_as_json(experiments: Sequence[Experiment]) -> dict[str, Any]:
     files: dict[str, Any] = {}
-    for scenario, name in sorted({(e.scenario, e.drive_label) for e in experiments}):
+    for scenario, name in sorted({(e.family_or_scenario, e.drive_label) for e in experiments}):
         files.setdefault(scenario, {"tests": []})["tests"].append({"id": name, "name": name})
     return files
 

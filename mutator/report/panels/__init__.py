@@ -9,6 +9,7 @@ from mutator._common.extension_doors import STUDY_DOOR
 from mutator.report.panel import Panel, ReportPage
 from mutator.report.panels import (
     failed_runs_panel,
+    families_panel,
     fault_paths_panel,
     figures_panel,
     mutation_score_panel,
@@ -23,6 +24,7 @@ from mutator.report.reported_run import ReportedRun
 PanelBuilder = Callable[[ReportedRun], Panel | None]
 
 PANELS: tuple[PanelBuilder, ...] = (
+    families_panel.build_families_panel,
     values_panel.build_values_panel,
     mutation_score_panel.build_mutation_score_panel,
     source_panel.build_source_panel,

@@ -54,7 +54,7 @@ def build_failed_runs_panel(run: ReportedRun) -> Panel | None:
 
 def _failed_runs_markdown(failed: Sequence[ResultRow], count: int) -> str:
     rows = [
-        (r.status.value, r.experiment_id, r.fault, r.scenario, r.detail)
+        (r.status.value, r.experiment_id, r.fault, r.scenario_label, r.detail)
         for r in failed[:MOST_RUNS_IN_MARKDOWN]
     ]
     table = TextTable(heads=_COLUMN_HEADS, rows=rows).as_markdown()
@@ -68,7 +68,7 @@ def _linked_table(failed: Sequence[ResultRow]) -> TextTable:
     ending = Markup('<span class="ending {0}">{0}</span>').format
     link = Markup('<a href="#e={0}"><code>{0}</code></a>').format
     rows = [
-        (ending(r.status.value), link(r.experiment_id), r.fault, r.scenario, r.detail)
+        (ending(r.status.value), link(r.experiment_id), r.fault, r.scenario_label, r.detail)
         for r in failed[:MOST_RUNS_ON_PAGE]
     ]
     return TextTable(heads=_COLUMN_HEADS, rows=rows)

@@ -21,7 +21,7 @@ _HTML_TEMPLATE = """\
 <p class="kicker">{{ kicker }}</p>
 <h2>{{ worst.sentence or worst.fault }}</h2>
 <p class="under"><span class="ending {{ worst.ending }}">{{ worst.ending | replace("_", " ") }}</span>
-<span class="fault">{{ worst.fault }}</span> in {{ worst.scenario }}, trigger {{ worst.trigger }}.
+<span class="fault">{{ worst.fault }}</span> in {{ worst.scenario_label }}, trigger {{ worst.trigger }}.
 <a href="#e={{ worst.experiment_id }}">Open it: diff, plots, metrics</a></p>
 <div id="worst-replay"></div>
 </div>
@@ -98,5 +98,5 @@ def _words_before_worst_experiment(worst: ResultRow) -> str:
 
 
 def _worst_markdown(kicker: str, worst: ResultRow) -> str:
-    place = f"{worst.fault} in {worst.scenario}, trigger {worst.trigger}, `{worst.experiment_id}`"
+    place = f"{worst.fault} in {worst.scenario_label}, trigger {worst.trigger}, `{worst.experiment_id}`"
     return f"**{kicker}:** {worst.sentence} ({place})" if worst.sentence else f"**{kicker}:** {place}"

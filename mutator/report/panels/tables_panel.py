@@ -5,13 +5,14 @@ from dataclasses import replace
 from operator import itemgetter
 
 from mutator._common.table_rendering import TextTable
-from mutator.outcomes.fault_free_runs import fault_free_alerts_note, fault_free_table
+from mutator.outcomes.fault_free_runs import fault_free_alerts_note, fault_free_table, unlisted_runs_note
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import (
     checked_hazard_names,
     count_outcomes_by_group,
     count_table,
+    families_or_scenarios_of,
     fault_types_of,
 )
 from mutator.statistics.fault_free_drive_tables import (
@@ -40,7 +41,7 @@ NO_ALERT_NOTE = " *Hazard, no alert*: no alert at all, before or after the hazar
 FAULT_FREE_NOTE = "The golden runs: first times of alerts and hazards, and the range of each plotted channel."
 _GROUPINGS = (
     ("By fault type", "fault type", fault_types_of),
-    ("By scenario", "scenario", itemgetter("scenario")),
+    ("By scenario", "scenario", families_or_scenarios_of),
     ("By method", "method", itemgetter("method")),
 )
 _HTML_TEMPLATE = """\
@@ -94,8 +95,9 @@ def build_tables_panel(run: ReportedRun) -> Panel:
     for title, table in counts:
         parts += filter(None, (f"## {title}", golden_alerts_note, table.as_markdown()))
     fault_free = fault_free_table(runs, alerts=run.folder.has_alerts) if runs else None
+    fault_free_note = " ".join(filter(None, (FAULT_FREE_NOTE, unlisted_runs_note(runs))))
     if fault_free:
-        parts += ["## Fault-free runs", FAULT_FREE_NOTE, fault_free.as_markdown()]
+        parts += ["## Fault-free runs", fault_free_note, fault_free.as_markdown()]
     drives = load_judged_drives(run.folder)
     if drives:
         sheets.insert(0, _drives_sheet(run.folder, drives))
@@ -109,7 +111,7 @@ def build_tables_panel(run: ReportedRun) -> Panel:
         counts=counts,
         note=golden_alerts_note,
         fault_free=fault_free,
-        about=FAULT_FREE_NOTE,
+        about=fault_free_note,
         sheets=sheets,
     )
     return Panel(

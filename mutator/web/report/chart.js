@@ -21,13 +21,17 @@ const Chart = (() => {
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
-  const colour = (number) => css(`mark-${number % COLOURS}`);
+  /** Marks of outcomes: shape and colour. */
+  const ENDINGS = { hazard: [0, "hazard"], sdc: [1, "sdc"], masked: [2, "masked"], "not activated": [3, "idle"], "crashed or timed out": [4, "broken"],
+    "hazard without a fault": [0, "hazard"], "no hazard": [2, "masked"] };
 
-  const shape = (number) => SHAPES[number % SHAPES.length];
+  const colour = (mark) => css(mark in ENDINGS ? ENDINGS[mark][1] : `mark-${mark % COLOURS}`);
 
-  /** The mark of a scenario, by its number, for a legend. */
-  const icon = (number) => Dom.svg("svg", { viewBox: "-1.6 -1.6 3.2 3.2", width: 14, height: 14, "aria-hidden": "true",
-    class: `mark-icon of-${number % COLOURS}` }, Dom.svg("path", { d: shape(number) }));
+  const shape = (mark) => SHAPES[mark in ENDINGS ? ENDINGS[mark][0] : mark % SHAPES.length];
+
+  /** The mark of a scenario, by its number, or of an outcome, for a legend. */
+  const icon = (mark) => Dom.svg("svg", { viewBox: "-1.6 -1.6 3.2 3.2", width: 14, height: 14, "aria-hidden": "true",
+    class: `mark-icon of-${mark in ENDINGS ? ENDINGS[mark][1] : mark % COLOURS}` }, Dom.svg("path", { d: shape(mark) }));
 
   /** The smallest range that has all finite `values`, with a margin; it is never empty. */
   function rangeOf(values, { share = 0.06 } = {}) {
@@ -39,9 +43,9 @@ const Chart = (() => {
   }
 
   /** Draw a mark with a uPlot chart's context, at a place in px of its canvas. */
-  function drawMark(context, number, x, y, radius, { isFilled }) {
-    const path = new Path2D(), drawn = colour(number);
-    path.addPath(new Path2D(shape(number)), new DOMMatrix([radius, 0, 0, radius, x, y]));
+  function drawMark(context, mark, x, y, radius, { isFilled }) {
+    const path = new Path2D(), drawn = colour(mark);
+    path.addPath(new Path2D(shape(mark)), new DOMMatrix([radius, 0, 0, radius, x, y]));
     Object.assign(context, { strokeStyle: drawn, fillStyle: drawn, lineWidth: uPlot.pxRatio * 1.6 });
     context.globalAlpha = 0.75;
     if (isFilled) context.fill(path);

@@ -89,13 +89,13 @@ class Experiment {
   #fill() {
     const { el } = Dom;
     const id = this.text("experiment_id");
-    document.title = `${this.text("fault")} in ${this.text("scenario")} - ${this.title}`;
+    document.title = `${this.text("fault")} in ${this.table.scenario(this.row)} - ${this.title}`;
     const code = (name) => el("span", { title: this.table.meaning(name, this.text(name)) }, this.text(name));
     const section = (title, name) => el(`section.${name}`, {}, el("h3", {}, title), el("div.content", {}, el("p.quiet", {}, "…")));
     this.place.replaceChildren(
       el("header", {},
         el("div", {}, el("h2", { tabindex: -1, id: "experiment-title" }, Dom.bound(this.text("sentence") || this.text("fault"))),
-          el("p.under", {}, el("span.fault", {}, this.text("fault")), ": ", Grid.ending(this.text("ending")), Happened.ALERTED[this.text("warning")] ?? "", " in ", code("scenario"), ", trigger ", code("trigger"))),
+          el("p.under", {}, el("span.fault", {}, this.text("fault")), ": ", Grid.ending(this.text("ending")), Happened.ALERTED[this.text("warning")] ?? "", " in ", this.scenario(), ", trigger ", code("trigger"))),
         this.buttons()),
       el("p.id", {}, "experiment ", el("code", {}, id), " ", Dom.copyButton(() => id, "Copy id"), " ", Dom.copyButton(() => this.#link(), "Copy link")),
       this.text("detail") ? el("p.detail", {}, Dom.bound(this.text("detail"))) : "",
@@ -131,13 +131,25 @@ class Experiment {
       this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`), tried);
   }
 
+  /** The scenario, with its meaning; of a family, with its values. */
+  scenario() {
+    return Dom.el("span", { title: this.table.meaning("scenario", this.text("scenario")) }, Dom.bound(this.table.scenario(this.row)));
+  }
+
+  /** The scenario as commands name it: `S1`, or `follow:ego_kph=60,gap_m=20`. */
+  scenarioArgument() {
+    const name = this.text("scenario"), family = this.table.families.find((each) => each.name === name);
+    if (!family || this.text("family") !== name) return name;
+    return `${name}:${family.parameters.map(({ key }) => `${key}=${this.text(key)}`).join(",")}`;
+  }
+
   /** The `mutator try` command for this fault. A random trigger becomes a time. The reading is always named, because
    *  the default depends on the library. */
   tryCommand() {
     const value = this.text("value"), isNumber = value !== "" && !Number.isNaN(Number(value));
-    const quoted = (text) => (/^[\w./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
+    const quoted = (text) => (/^[\w./:=,-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
     const when = /^\w+$/.test(this.text("trigger")) ? this.text("trigger") : this.text("condition").replace(/^t >= ([\d.]+)$/, "$1");
-    const parts = ["mutator try", quoted(this.text("kind")), "--scenario", quoted(this.text("scenario"))];
+    const parts = ["mutator try", quoted(this.text("kind")), "--scenario", quoted(this.scenarioArgument())];
     if (this.text("variant")) parts.push("--variant", quoted(this.text("variant")));
     if (isNumber) parts.push("--value", value);
     if (when) parts.push("--trigger", quoted(when));

@@ -45,7 +45,7 @@ const FaultValues = (() => {
     return measures.sort((a, b) => groups.indexOf(a.group) - groups.indexOf(b.group));
   }
 
-  /** The points of a fault, by value: {points: [{row, x, y, scenario, isHazard}], inactive, unlimited}. Rows whose fault was
+  /** The points of a fault, by value: {points: [{row, x, y, scenario, drive, isHazard}], inactive, unlimited}. Rows whose fault was
    *  never active or that have no finite `y` are only counted. */
   function pointsOf(table, fault, measure) {
     const points = [], left = { inactive: 0, unlimited: 0 };
@@ -53,7 +53,7 @@ const FaultValues = (() => {
       const y = table.number(row, measure.name);
       if (table.text(row, "t_activation") === "") left.inactive++;
       else if (!Number.isFinite(y)) left.unlimited++;
-      else points.push({ row, x: valueOf(table, row), y, scenario: table.text(row, "scenario"), isHazard: table.text(row, "hazards") !== "" });
+      else points.push({ row, x: valueOf(table, row), y, scenario: table.text(row, "scenario"), drive: table.scenario(row), isHazard: table.text(row, "hazards") !== "" });
     }
     return { points: points.sort((a, b) => a.x - b.x || a.y - b.y), ...left };
   }

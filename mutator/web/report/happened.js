@@ -25,7 +25,7 @@ class Happened {
     const { el } = Dom;
     const withMeaning = (name) => [this.text(name), this.table.meaning(name, this.text(name))].filter(Boolean).join(": ");
     const condition = this.text("condition"), trigger = withMeaning("trigger");
-    const rows = [["scenario", withMeaning("scenario")], ["trigger", trigger.includes(condition) || trigger.startsWith("at ") ? trigger : `${condition} (${trigger})`]];
+    const rows = [["scenario", [this.table.scenario(this.row), this.table.meaning("scenario", this.text("scenario"))].filter(Boolean).join(": ")], ["trigger", trigger.includes(condition) || trigger.startsWith("at ") ? trigger : `${condition} (${trigger})`]];
     if (this.text("status") === "ok" && this.table.columns.has("alerts")) rows.push(["alert", this.#alert()]);
     return el("table.plain.setting", {}, el("tbody", {}, rows.filter(([, about]) => about).map(([name, about]) =>
       el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, Dom.bound(about))))));

@@ -30,7 +30,7 @@ class ReplayBeside {
   #groups() {
     const { table, row } = this, same = (other, ...names) => names.every((name) => table.text(other, name) === table.text(row, name));
     const rows = Array.from({ length: table.count }, (_, other) => other)
-      .filter((other) => other !== row && table.text(other, "status") === "ok" && same(other, "scenario", "seed")).sort((a, b) => table.number(a, "rank") - table.number(b, "rank"));
+      .filter((other) => other !== row && table.text(other, "status") === "ok" && same(other, "scenario", "concrete_scenario", "seed")).sort((a, b) => table.number(a, "rank") - table.number(b, "rank"));
     const isSameFault = (other) => same(other, "kind", "variant");
     return [["Same fault, another value or trigger", rows.filter(isSameFault)], ["Another fault, same trigger", rows.filter((other) => !isSameFault(other) && same(other, "trigger"))]];
   }

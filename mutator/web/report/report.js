@@ -26,6 +26,7 @@ const Report = (() => {
     const actions = { move: (by) => grid.move(by), close: () => view.close(), place: () => grid.placeOf(state.experiment) };
     const experiment = new Experiment(find("experiment"), table, state, { ...facts, run: facts.series.alone ? () => "DIR" : runFolder }, actions);
     const values = new ValuePanel(find("value-plots"), table, state, facts);
+    new FamilyPanel(find("family-plots"), table, state);
     const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment, values });
     searching(search, state);
     keyboard({ grid, experiment, search, close: view.close });
@@ -90,7 +91,7 @@ const Report = (() => {
       const isOpen = Boolean(state.experiment), wasOpen = experiment.isOpen;
       if (isOpen && !wasOpen) {
         scrolled = scrollY;
-        opener = document.activeElement?.closest("#value-plots") ? document.activeElement : null;
+        opener = document.activeElement?.closest("#value-plots, #family-plots") ? document.activeElement : null;
       }
       document.body.classList.toggle("has-experiment", isOpen);
       for (const beneath of document.querySelectorAll("main, .bar")) beneath.inert = isOpen && !matchMedia(WIDE).matches;

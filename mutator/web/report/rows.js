@@ -23,7 +23,7 @@ const Rows = (() => {
     { name: "through", title: "Link passed", between: ";", none: "no link" },
   ];
   const OF_COMPONENTS = ["reached", "stopped_at", "through"];
-  const SEARCHED = ["experiment_id", "fault", "kind", "variant", "value", "unit", "scenario", "method", "trigger", "condition",
+  const SEARCHED = ["experiment_id", "fault", "kind", "variant", "value", "unit", "scenario", "concrete_scenario", "method", "trigger", "condition",
     "ending", "outcome", "severity", "hazards", "alerts", "warning", "detail"];
   const SEARCHED_PARTS = "its id, fault, value, scenario, trigger, outcome, severity, hazards, alerts or error";
   const SILENT = ["no alert at all", "alert only after the hazard"]; // hazards without an alert before them
@@ -60,6 +60,7 @@ const Rows = (() => {
       this.severities = data.severities || {}; // severity classes in words, by name
       this.of = data.of || data.count; // number of experiments of the run; for a large run the page lists only the worst
       this.map = data.map || null; // of all experiments, if not all are listed (report/whole_map.py)
+      this.families = data.families || []; // of the scenarios: names and parameters
       this.columns = new Map(data.columns.map((c) => [c.name, column(c)]));
       this.facets = FACETS.map((of) => facet(of, this.columns)).filter(Boolean);
       this.meanings = meanings; // by column and code
@@ -75,6 +76,19 @@ const Rows = (() => {
     text(row, name) {
       const column = this.columns.get(name);
       return column ? column.text(row) : "";
+    }
+
+    /** The scenario of a row: `S1`, or family and values, `follow, ego 60 km/h, gap 20 m`. */
+    scenario(row) {
+      const name = this.text(row, "scenario"), family = this.families.find((each) => each.name === name);
+      if (!family || this.text(row, "family") !== name) return name;
+      return [name, ...family.parameters.map((parameter) => this.parameter(row, parameter))].join(", ");
+    }
+
+    /** A parameter's value in a row, with name and unit: `ego 60 km/h`. */
+    parameter(row, { key, name, unit }) {
+      const value = this.number(row, key);
+      return `${name} ${Number.isNaN(value) ? this.text(row, key) : Number(value.toPrecision(6))}${unit ? ` ${unit}` : ""}`;
     }
 
     /** The text that shows a value of a column. Components have labels, and severity classes have words. */

@@ -8,8 +8,8 @@ class ValuePlot {
   static MOST_IN_LEGEND = 12; // scenarios in the legend
   static MOST_IN_TABLE = 500;
 
-  /** `open(row)` opens an experiment, `describe(row)` says in words what it was. */
-  constructor(place, { open, describe }) {
+  /** `open(row)` opens an experiment, `describe(row)` says in words what it was; `groups` is the legend's name. */
+  constructor(place, { open, describe, groups = "Scenarios" }) {
     const { el } = Dom;
     this.open = open;
     this.describe = describe;
@@ -21,7 +21,7 @@ class ValuePlot {
     this.stage = el("div.stage-of-values", { tabindex: 0, role: "application", "aria-roledescription": "plot", onkeydown: (event) => this.#key(event),
       onfocus: () => this.#choose(this.last), onblur: () => this.#choose(-1) }, this.room);
     this.about = el("p.point", { role: "status" });
-    this.legend = el("ul.marks", { "aria-label": "Scenarios" });
+    this.legend = el("ul.marks", { "aria-label": groups });
     this.body = el("div.scroll");
     this.table = el("details.as-table", { ontoggle: () => this.#fillTable() }, el("summary", {}, "The same points as a table"), this.body);
     place.replaceChildren(this.stage, this.about, this.legend, this.table);
@@ -30,8 +30,9 @@ class ValuePlot {
     this.stage.addEventListener("click", (event) => this.#click(event));
   }
 
-  /** Show points (FaultValues.pointsOf) of a fault over a measure; `limits` are [value, words]. */
-  show(fault, measure, points, limits) {
+  /** Show points (FaultValues.pointsOf) of a fault over a measure; `limits` are [value, words]. `xValues` and `yValues` name ticks.
+   *  @param {any} fault @param {any} measure @param {any[]} points @param {any[]} limits @param {{xValues?: any, yValues?: any}} names */
+  show(fault, measure, points, limits, { xValues, yValues } = {}) {
     this.fault = fault;
     this.measure = measure;
     this.points = points;
@@ -40,11 +41,11 @@ class ValuePlot {
     this.scenarios = [...new Set(points.map(({ scenario }) => scenario))].sort((a, b) => a.localeCompare(b, "en", { numeric: true }));
     this.numbers = new Map(this.scenarios.map((name, number) => [name, number]));
     const unit = (text) => (text ? ` [${text}]` : "");
-    this.heads = [`value${unit(fault.unit)}`, `${measure.title}${unit(measure.unit)}`];
+    this.heads = [`${fault.axis ?? "value"}${unit(fault.unit)}`, `${measure.title}${unit(measure.unit)}`];
     const [x, y] = [points.map((point) => point.x), [...points.map((point) => point.y), ...limits.map(([value]) => value)]];
     this.stage.setAttribute("aria-label", `${this.heads[1]} against ${this.heads[0]} of ${fault.name}, ${points.length} experiments. Arrows move between them, Enter opens one.`);
     this.room.replaceChildren();
-    this.chart = Chart.chart(this.room, { x: { label: this.heads[0], range: Chart.rangeOf(x) }, y: { label: this.heads[1], range: Chart.rangeOf(y, { share: 0.1 }) },
+    this.chart = Chart.chart(this.room, { x: { label: this.heads[0], range: Chart.rangeOf(x), values: xValues }, y: { label: this.heads[1], range: Chart.rangeOf(y, { share: 0.1 }), values: yValues },
       data: [Chart.rangeOf(x)], label: `${this.heads[1]} against ${this.heads[0]}`, draw: (chart) => this.#draw(chart, limits) });
     this.chart.over.append(this.ring);
     this.#choose(-1);
@@ -54,14 +55,19 @@ class ValuePlot {
 
   #draw(chart, limits) {
     for (const { x, y, scenario, isHazard } of this.points) {
-      Chart.drawMark(chart.ctx, this.numbers.get(scenario), chart.valToPos(x, "x", true), chart.valToPos(y, "y", true), ValuePlot.RADIUS * uPlot.pxRatio, { isFilled: isHazard });
+      Chart.drawMark(chart.ctx, this.markOf(scenario), chart.valToPos(x, "x", true), chart.valToPos(y, "y", true), ValuePlot.RADIUS * uPlot.pxRatio, { isFilled: isHazard });
     }
     for (const [y, words] of limits) Chart.drawLimit(chart, { y, words, colour: Chart.css("hazard") });
   }
 
+  /** The number of the mark of a scenario. */
+  markOf(scenario) {
+    return this.numbers.get(scenario);
+  }
+
   #showLegend() {
     const { el } = Dom, hidden = this.scenarios.length - ValuePlot.MOST_IN_LEGEND;
-    this.legend.replaceChildren(...this.scenarios.slice(0, ValuePlot.MOST_IN_LEGEND).map((name, number) => el("li", {}, Chart.icon(number), ` ${name}`)),
+    this.legend.replaceChildren(...this.scenarios.slice(0, ValuePlot.MOST_IN_LEGEND).map((name) => el("li", {}, Chart.icon(this.markOf(name)), ` ${name}`)),
       hidden > 0 ? el("li.quiet", {}, `and ${hidden} more`) : "", this.points.length ? el("li.quiet", {}, "filled: with a hazard; hollow: without") : "");
   }
 
@@ -74,7 +80,7 @@ class ValuePlot {
     let nearest = -1, least = ValuePlot.NEAR;
     this.points.forEach((point, number) => {
       const [x, y] = this.#at(point), distance = Math.hypot(x - event.clientX + left, y - event.clientY + top);
-      if (distance < least) [nearest, least] = [number, distance];
+      if (distance <= least) [nearest, least] = [number, distance];
     });
     return nearest;
   }
@@ -120,20 +126,22 @@ class ValuePlot {
     this.last = number;
     const [x, y] = this.#at(point);
     this.ring.style.transform = `translate(${x}px, ${y}px)`;
-    this.about.replaceChildren(this.#words(point));
+    this.about.replaceChildren(this.words(point));
   }
 
-  #words({ row, x, y, scenario }) {
+  /** What the point at which the user looks says.
+   *  @param {any} point @returns {string} */
+  words({ row, x, y, drive }) {
     const { fault, measure } = this, text = (value, unit) => `${Grid.number(value)}${unit ? ` ${unit}` : ""}`;
-    return `${text(x, fault.unit)} in ${scenario}: ${measure.title} ${text(y, measure.unit)}. ${this.describe(row)}`;
+    return `${text(x, fault.unit)} in ${drive}: ${measure.title} ${text(y, measure.unit)}. ${this.describe(row)}`;
   }
 
   #fillTable() {
     const { el } = Dom, rest = this.points.length - ValuePlot.MOST_IN_TABLE;
     if (!this.table.open) return this.body.replaceChildren();
     this.body.replaceChildren(el("table.plain", {}, el("thead", {}, el("tr", {}, [...this.heads, "scenario", "experiment"].map((head) => el("th", { scope: "col" }, head)))),
-      el("tbody", {}, this.points.slice(0, ValuePlot.MOST_IN_TABLE).map(({ row, x, y, scenario }) => el("tr", {}, el("td.number", {}, Grid.number(x)), el("td.number", {}, Grid.number(y)),
-        el("td", {}, scenario), el("td", {}, el("button.link", { type: "button", onclick: () => this.open(row) }, this.describe(row))))))),
+      el("tbody", {}, this.points.slice(0, ValuePlot.MOST_IN_TABLE).map(({ row, x, y, drive }) => el("tr", {}, el("td.number", {}, Grid.number(x)), el("td.number", {}, Grid.number(y)),
+        el("td", {}, drive), el("td", {}, el("button.link", { type: "button", onclick: () => this.open(row) }, this.describe(row))))))),
       rest > 0 ? el("p.quiet", {}, `and ${rest} more`) : "");
   }
 }

@@ -12,7 +12,7 @@ from mutator.campaigns.sampling import (
     draw_in_proportion,
     evenly_spread_indices,
 )
-from mutator.model import AfterHazard, Experiment, Method
+from mutator.model import AfterHazard, ConcreteScenario, Experiment, Method
 
 SPECS = ("radar/chaff/distance", "radar/jamming/no_data", "car/speed/slower")
 
@@ -119,3 +119,41 @@ def test_a_proportional_sample_of_an_unsuitable_size_is_refused(many: list[Exper
     """The size must be even, and at least two for each variant in each scenario."""
     with pytest.raises(ValueError, match="a multiple of 2, 12 or more"):
         draw_in_proportion(many, count, seed=1)
+
+
+@pytest.fixture
+def of_family(experiment: Callable[..., Experiment]) -> list[Experiment]:
+    """Three faults in each of 40 scenarios of a family, and in S1."""
+    scenarios = [
+        ConcreteScenario(family="follow", values={"ego_kph": kph}, label=f"ego {kph} km/h", text=str(kph))
+        for kph in range(40)
+    ]
+    made = [experiment(1, "S1", Method.RANDOM, "random/C1", spec) for spec in SPECS]
+    return made + [
+        replace(
+            experiment(value, scenario.name, Method.RANDOM, "random/C1", spec),
+            scenario_digest=scenario.digest,
+            concrete=scenario,
+        )
+        for scenario in scenarios
+        for spec in SPECS
+        for value in (1, 2)
+    ]
+
+
+@pytest.mark.parametrize("draw", [draw_balanced, draw_balanced_pairs])
+def test_the_scenarios_of_a_family_count_as_one_and_take_turns(
+    of_family: list[Experiment], draw: Callable[..., tuple[Experiment, ...]]
+) -> None:
+    """S1 has as large a share as the family; no scenario of it has two of a variant before all have one."""
+    picked = draw(of_family, 6, seed=1)
+    assert Counter(e.family_or_scenario for e in picked) == {"S1": 3, "follow": 3}
+    picked = draw(of_family, 3 + 3 * 40, seed=1)
+    assert set(Counter((e.scenario, e.fault.spec) for e in picked).values()) == {1}
+
+
+def test_a_sample_in_proportion_takes_families_as_a_whole(of_family: list[Experiment]) -> None:
+    """Fewer experiments than scenarios can be drawn, and experiments of different scenarios are no pair."""
+    picked = draw_in_proportion(of_family, 30, seed=1)
+    assert Counter(e.family_or_scenario for e in picked)["S1"] == 3
+    assert len({e.scenario for e in picked}) > 10

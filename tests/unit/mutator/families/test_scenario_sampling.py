@@ -9,7 +9,7 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.families.family import Family
 from mutator.families.family_yaml import load_family
-from mutator.families.scenario_sampling import SAMPLING_METHODS, sample_scenarios
+from mutator.families.scenario_sampling import SAMPLING_METHODS, frequency_weight, sample_scenarios
 
 TEXT = """\
 schema: family/1
@@ -29,6 +29,26 @@ DRAWN = [method for method in SAMPLING_METHODS if method != "grid"]
 def family(tmp_path: Path) -> Family:
     (tmp_path / "stop.yaml").write_text(TEXT)
     return load_family(tmp_path / "stop.yaml")
+
+
+@pytest.mark.parametrize("method", DRAWN)
+def test_a_weight_relates_occurrence_to_the_draw(tmp_path: Path, method: str) -> None:
+    """Values that occur as often as they are drawn have weight 1; a grid draws all values equally often."""
+    speeds = "{from: 1, to: 100, step: 1, normal: {mean: 50, sd: 20}}"
+    parts = "{from: 1, to: 51, weight: 3}, {from: 51, to: 100, weight: 1}"
+    text = TEXT.replace("{from: 1, to: 100, step: 1}", speeds, 1)
+    text += f"frequency: {{source: A count, of: {{gap_m: [{parts}]}}}}\n"
+    (tmp_path / "stop.yaml").write_text(text)
+    family = load_family(tmp_path / "stop.yaml")
+    for values, expected in (((50, 1), 1.5), ((1, 50), 1.5), ((50, 100), 0.5)):
+        weight = frequency_weight(family, dict(zip(("ego_kph", "gap_m"), values, strict=True)), method)
+        assert weight == pytest.approx(expected)
+    by_speed = text.replace("of: {gap_m", "of: {ego_kph")
+    (tmp_path / "stop.yaml").write_text(by_speed)
+    family = load_family(tmp_path / "stop.yaml")
+    slow, middle = ({"ego_kph": kph, "gap_m": 9} for kph in (1, 50))
+    assert frequency_weight(family, slow, method) > frequency_weight(family, middle, method)
+    assert frequency_weight(family, slow, "grid") == frequency_weight(family, middle, "grid")
 
 
 @pytest.mark.parametrize("method", SAMPLING_METHODS)

@@ -203,6 +203,7 @@ def test_a_cause_shows_its_worst_experiment_and_how_many_more() -> None:
     """A fault type with many experiments of one hazard is one line, so that other causes are seen, too."""
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
     frame = frame.assign(status="ok", t_h1=3.0, t_h2=4.0, h1=1.0, h2=1.0, sentence="It hits.")
+    frame = frame.assign(scenario_label=frame["scenario"])
     frame.attrs["hazards"] = ("H1", "H2")
     metrics = [MetricFacts("margin_h1", "m", "", "lower"), MetricFacts("margin_h2", "s", "", "lower")]
     answer = most_dangerous_answer(frame, metrics, {"S1": "light (severity S1)"}, has_alerts=True)
