@@ -33,7 +33,7 @@ def rows(draw: st.DrawFn) -> ResultRow:
     outcome = draw(st.sampled_from(Outcome)) if status is Status.OK else None
     return ResultRow(
         **dict.fromkeys(("experiment_id", "kind", "variant", "value", "unit"), "x"),
-        **dict.fromkeys(("scenario", "trigger", "detail"), "x"),
+        **dict.fromkeys(("scenario", "scenario_label", "trigger", "detail"), "x"),
         status=status,
         outcome=outcome,
         ending=(outcome or status).value,

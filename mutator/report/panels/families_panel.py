@@ -36,7 +36,9 @@ _HTML_TEMPLATE = """\
 <details class="table"{{ " open" if loop.first }}>
 <summary><h3>{{ family.facts.name }}: {{ family.facts.title }}</h3></summary>
 <p>{{ note }}</p>
+{% if table %}
 {{ table.as_html("plain") }}
+{% endif %}
 </details>
 {% endfor %}
 <div id="family-plots" class="no-print"></div>
@@ -53,7 +55,8 @@ def build_families_panel(run: ReportedRun) -> Panel | None:
     listed = []
     for family in families:
         note, table = _note(family), _shares_table(family)
-        parts += [f"### {family.facts.name}", f"{family.facts.title}. {note}", table.as_markdown()]
+        parts += [f"### {family.facts.name}", f"{family.facts.title}. {note}"]
+        parts += [table.as_markdown()] if table else []
         listed.append((family, note, table))
     parts.append("The maps of results and margins over the parameters are in `index.html`.")
     sheet = families_sheet({family.facts.name: family.shares for family in families})
@@ -87,7 +90,10 @@ def _note(family: FamilyResults) -> str:
     return " ".join(parts)
 
 
-def _shares_table(family: FamilyResults) -> TextTable:
+def _shares_table(family: FamilyResults) -> TextTable | None:
+    """Return the table of shares; None without experiments."""
+    if not family.experiment_count:
+        return None
     heads = ["what", "share", *(["weighted share"] if family.frequency_source else [])]
     rows = [
         [share.what, str(share.share), *([str(share.weighted)] if share.weighted else [])]

@@ -49,9 +49,10 @@ class FamilyPanel {
     this.goldenCounts = el("p.quiet", {});
     this.marginFigure = el("figure", {}, el("figcaption", {}, "Without any fault: where the controller is near its edge"),
       row(label("margin-over", "Over:"), this.over, label("margin-shown", "Shown:"), this.metric), margins, this.goldenCounts);
+    this.mapFigure = el("figure", {}, el("figcaption", {}, "The worst outcome of each concrete scenario"),
+      row(label("map-x", "Across:"), this.x, label("map-y", "Up:"), this.y), map, this.counts);
     this.place.replaceChildren(this.data.families.length > 1 ? row(label("plotted-family", "Family:"), this.family) : "",
-      el("div.two-plots", {}, el("figure", {}, el("figcaption", {}, "The worst outcome of each concrete scenario"),
-        row(label("map-x", "Across:"), this.x, label("map-y", "Up:"), this.y), map, this.counts), this.marginFigure));
+      el("div.two-plots", {}, this.mapFigure, this.marginFigure));
     const open = (at) => at >= 0 && this.state.set({ experiment: this.table.text(at, "experiment_id") }), describe = (at) => this.#describe(at);
     this.map = new FamilyPlot(map, { open, describe, groups: "Worst outcomes" });
     this.margins = new FamilyPlot(margins, { open, describe, groups: "Golden runs" });
@@ -73,7 +74,8 @@ class FamilyPanel {
     const margin = metrics.find(({ name }) => name.startsWith("margin_"));
     if (margin) this.metric.value = margin.name;
     this.marginFigure.hidden = !metrics.length;
-    this.#showMap();
+    this.mapFigure.hidden = !this.scenarios.size;
+    if (this.scenarios.size) this.#showMap();
     if (metrics.length) this.#showMargins();
   }
 

@@ -19,7 +19,7 @@ Make = Callable[..., Experiment]
 def row(experiment_id: str = "e", **given: Any) -> ResultRow:
     fields: dict[str, Any] = {
         "experiment_id": experiment_id,
-        **dict.fromkeys(("kind", "variant", "value", "unit", "scenario", "trigger"), "x"),
+        **dict.fromkeys(("kind", "variant", "value", "unit", "scenario", "scenario_label", "trigger"), "x"),
         "status": Status.OK,
         "outcome": Outcome.MASKED,
         "t_activation": 2.0,

@@ -93,7 +93,7 @@ def test_the_results_are_read_once_for_many_groups(
 def row(**given: Any) -> ResultRow:
     fields: dict[str, Any] = {
         "experiment_id": "e", "kind": "m/f", "variant": "v", "value": "", "unit": "",
-        "scenario": "A", "trigger": "C1", "status": Status.OK, "outcome": None,
+        "scenario": "A", "scenario_label": "A", "trigger": "C1", "status": Status.OK, "outcome": None,
         "t_activation": 2.0, "t_manifest": 2.5, "hazards": (), "alerts": (), "t_alert": None,
         "reaction_time": None, "detail": "",
     }  # fmt: skip
