@@ -77,7 +77,10 @@ def record(experiment: Experiment, number: int, patch: bytes) -> Record:
     )
 
 
-def build_run(workspace: Workspace, out: Path) -> tuple[Plan, RunFolder]:
+BuildRun = Callable[[Workspace, Path], tuple[Plan, RunFolder]]
+
+
+def build_synthetic_run(workspace: Workspace, out: Path) -> tuple[Plan, RunFolder]:
     """Plan the campaign `toy`, and write synthetic records and the tables of its run folder."""
     plan = build_plan(workspace, "toy")
     folder = freeze_plan(plan, out, workspace)
@@ -97,6 +100,11 @@ def build_run(workspace: Workspace, out: Path) -> tuple[Plan, RunFolder]:
 
 
 @pytest.fixture(scope="session")
+def build_run() -> BuildRun:
+    return build_synthetic_run
+
+
+@pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
     """A run folder of 24 experiments with its report.
 
@@ -104,7 +112,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     """
     folder = tmp_path_factory.mktemp("browser")
     workspace = copy_toycar(folder)
-    plan, out = build_run(workspace, folder / "run")
+    plan, out = build_synthetic_run(workspace, folder / "run")
     manifest = workspace.manifest("toycar")
     t = np.arange(0.0, 6.0, 0.05)
     names = ("gas", "brake", "wheel_turn", "gap", "speed")

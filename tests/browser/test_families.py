@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from conftest import build_run
 
 from mutator.report import family_results, report_builder
 from mutator.report.panels import figures_panel
@@ -15,7 +14,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
-    from conftest import Page
+    from conftest import BuildRun, Page
 
 FAMILY = """\
 schema: family/1
@@ -46,7 +45,7 @@ def golden_runs(folder: RunFolder) -> tuple[JudgedDrive, ...]:
                 t_end=None,
                 hazards=(("H3", 2.0),) if number == 0 else (),
                 alerts=(),
-                metrics=(("margin_h3", number - 0.5),),
+                metrics=(("smallest_gap", number + 0.5),),
             ),
         )
         for number, golden in enumerate(g for g in folder.golden_runs if g.scenario.startswith("follow-"))
@@ -54,9 +53,15 @@ def golden_runs(folder: RunFolder) -> tuple[JudgedDrive, ...]:
 
 
 @pytest.fixture(scope="module")
-def run_of_family(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
+def run_of_family(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    build_run: "BuildRun",
+) -> Path:
     folder = tmp_path_factory.mktemp("families")
     workspace = copy_toycar(folder)
+    with (workspace.library / "targets" / "toycar.yaml").open("a") as manifest:
+        manifest.write("metrics: {smallest_gap: {min: gap, unit: m, worse: lower, about: smallest gap}}\n")
     (workspace.library / "families").mkdir()
     (workspace.library / "families" / "follow.yaml").write_text(FAMILY)
     campaign = workspace.library / "campaigns" / "toy.yaml"
@@ -106,7 +111,7 @@ def test_each_parameter_can_be_an_axis(page: "Page") -> None:
 
 def test_margins_of_golden_runs_are_drawn_over_a_parameter(page: "Page") -> None:
     """A golden run with a hazard is another mark, and its words say so."""
-    assert page.page.input_value("#margin-shown") == "margin_h3"
+    assert page.page.input_value("#margin-shown") == "smallest_gap"
     page.page.focus(".margins-of-family .stage-of-values")
     page.page.keyboard.press("Home")
     assert "without a fault" in page.page.inner_text(".margins-of-family .point")
