@@ -222,7 +222,7 @@ class ExperimentRunner:
             record = record_of_mutant_without_outcome(
                 experiment, Status.HARNESS_ERROR, _describe_problem(err), mutant
             )
-        self._check_input_unchanged(experiment, execution)
+        self._check_input_unchanged(experiment)
         return RecordedExperiment(
             experiment=experiment,
             record=record,
@@ -239,12 +239,11 @@ class ExperimentRunner:
             executed_functions=execution.executed_functions,
         )
 
-    def _check_input_unchanged(self, experiment: Experiment, execution: JobResult) -> None:
+    def _check_input_unchanged(self, experiment: Experiment) -> None:
         """Raise MutatorError if a run has written to what this experiment used, so its record would not
         count.
         """
-        if execution.mode is RunMode.GOLDEN_REUSED:
-            self.goldens.check_unchanged(execution.out)
+        self.goldens.check_unchanged(self.goldens.folder_of(experiment))
         scenario = self.scenario_file(experiment.scenario)
         if digest(read_bounded(scenario)) != experiment.scenario_digest:
             raise changed_file_error(scenario)

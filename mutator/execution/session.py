@@ -330,7 +330,9 @@ class Session:
             is_provisional=is_provisional,
             left_out=left_out,
             since_note=since_note,
-            golden_hazards_note=left_out_note_of_records(records, self.folder.planned_experiment_count),
+            golden_hazards_note=left_out_note_of_records(
+                records, outcomes, self.folder.planned_experiment_count
+            ),
         )
 
     def _make_proving_worker(self) -> Worker:
@@ -383,7 +385,7 @@ class Session:
             elapsed_s=time.monotonic() - self._start_s,
             has_reached_nothing=self._has_reached_nothing(outcome.outcomes),
             golden_hazards_note=left_out_note_of_records(
-                self.folder.records(), self.folder.planned_experiment_count
+                self.folder.records(), outcome.outcomes, self.folder.planned_experiment_count
             ),
         )
 

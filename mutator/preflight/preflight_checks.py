@@ -106,9 +106,11 @@ def raise_if_failed(folder: RunFolder, results: Sequence[CheckResult]) -> None:
 
 def describe_unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
     """Remarks on triggers of the plan that no golden run reaches; none unless the golden runs just ran or
-    were cached.
+    were cached. What is left out does not matter.
     """
-    experiments = ((folder.golden_run_of(e).key, e) for e in plan_file.iterate_experiments(folder.path))
+    left_out = folder.left_out_goldens
+    keyed = ((folder.golden_run_of(e).key, e) for e in plan_file.iterate_experiments(folder.path))
+    experiments = ((key, experiment) for key, experiment in keyed if key not in left_out)
     observed = unreached_triggers.load_observations(_pending_folder(folder))
     manifest = workspace.manifest(folder.head.target)
     return (

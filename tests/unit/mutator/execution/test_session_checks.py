@@ -148,6 +148,6 @@ def test_a_check_that_fails_after_experiments_began_leaves_no_result(
 
 
 def test_without_workers_all_checks_come_first(toycar: Workspace, tmp_path: Path) -> None:
-    checks = SessionChecks(toycar, workers=0, secret=b"s", notify=lambda progress: None)
+    checks = SessionChecks(toycar, workers=0, secret=b"s", with_forks=False, notify=lambda progress: None)
     assert checks.describe_progress() == ""
     assert checks.can_use("A")
