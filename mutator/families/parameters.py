@@ -100,6 +100,8 @@ class Parameter:
     def describe_values(self) -> str:
         """Return all values as text."""
         symbol = f" {self.unit.symbol}" if self.unit else ""
+        if len(self.values) == 1:
+            return f"{self.values[0]}{symbol}"
         if not self.is_range:
             return describe_choices([f"{value}" for value in self.values]) + symbol
         least, greatest = min(self.numbers), max(self.numbers)

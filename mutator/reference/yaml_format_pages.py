@@ -93,7 +93,22 @@ def render_families_page(workspace: Workspace) -> str:
         "All but `grid` follow the parameters' distributions and depend on the plan's first seed. A draw "
         "that breaks a constraint, or that is\nalready there, is replaced by the next. The first scenarios "
         "of `random` and `sobol` are the same for each `sample`.\n",
+        "## The families of this library\n",
+        "[What the controller does without faults](../explanation/fault-free-drives.md) shows how they are "
+        "driven.\n",
+        *_families_of_library(workspace),
     )
+
+
+def _families_of_library(workspace: Workspace) -> Iterator[str]:
+    for name in workspace.families:
+        family = workspace.family(name)
+        yield f"### {name}\n"
+        yield f"{family.title}. Source: {family.source}\n"
+        rows = [(parameter.name, parameter.describe_values()) for parameter in family.parameters]
+        rows += [("with", f"`{constraint}`") for constraint in family.constraints]
+        yield TextTable(heads=("parameter", "values"), rows=rows).as_markdown(escape=False)
+        yield ""
 
 
 def render_manifests_page(workspace: Workspace) -> str:
