@@ -16,6 +16,8 @@ from time import process_time, time
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "target"))
 
+from selfdrive.common import compiled  # noqa: E402
+from selfdrive.sim.compile_helpers import COMPILED_FOLDER  # noqa: E402
 from selfdrive.sim.scenario import load_scenario  # noqa: E402
 from selfdrive.sim.simulator import Simulator  # noqa: E402
 
@@ -44,6 +46,7 @@ limits: {{cpu_s: 60, wall_s: 300, memory_mb: 4096, steps: 20000}}
 
 def bare_loop_s() -> float:
     """Return the CPU time (s) of 30 s of simulation in one interpreter, the smaller of two."""
+    compiled.use_libraries_in(COMPILED_FOLDER)
     scenario, times = load_scenario(ROOT / "fault_library" / "scenarios" / "S1.yaml"), []
     for _ in range(2):
         simulator = Simulator()
