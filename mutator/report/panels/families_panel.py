@@ -31,7 +31,9 @@ _WEIGHTED_NOTE = (
 MOST_GOLDENS_ON_PAGE = 5_000  # golden runs of a family in the plot of margins: those with hazards first
 _HTML_TEMPLATE = """\
 <h2>Families</h2>
+{% if about %}
 <p>{{ about }}</p>
+{% endif %}
 {% for family, note, table in families %}
 <details class="table"{{ " open" if loop.first }}>
 <summary><h3>{{ family.facts.name }}: {{ family.facts.title }}</h3></summary>
@@ -51,7 +53,8 @@ def build_families_panel(run: ReportedRun) -> Panel | None:
     families = results_by_family(run)
     if not families:
         return None
-    parts = ["## Families", _INTRODUCTION]
+    about = _INTRODUCTION if any(family.experiment_count for family in families) else ""
+    parts = ["## Families", *filter(None, (about,))]
     listed = []
     for family in families:
         note, table = _note(family), _shares_table(family)
@@ -62,7 +65,7 @@ def build_families_panel(run: ReportedRun) -> Panel | None:
     sheet = families_sheet({family.facts.name: family.shares for family in families})
     html = rendered(
         _HTML_TEMPLATE,
-        about=_INTRODUCTION,
+        about=about,
         families=listed,
         data=Markup(packed_script_element(_page_data(run, families), "family-data")),
     )
