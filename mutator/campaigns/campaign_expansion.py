@@ -1,20 +1,16 @@
 """Turns a campaign into experiments: selects and expands faults, creates triggers, draws random times."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from functools import cached_property
 from itertools import chain
 from pathlib import Path
 
-from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import checked_name_not_path, is_inside, path_below
-from mutator._common.files import ScratchFolder
-from mutator._common.hashing import digest
+from mutator._common.confined_files import is_inside, path_below
 from mutator._common.message_text import describe_choices
 from mutator.campaigns.campaign_files import Campaign
+from mutator.campaigns.campaign_scenarios import CampaignScenarios
 from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.campaigns.operator_faults import OperatorFault, OperatorFaultFinder
 from mutator.campaigns.operator_selection import MutantActivity
@@ -22,14 +18,10 @@ from mutator.campaigns.plan_tally import FaultFreeDrive
 from mutator.campaigns.sampling import evenly_spread_indices
 from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError
-from mutator.families.family import Family
-from mutator.families.family_facts import FamilyFacts
-from mutator.families.scenario_sampling import sample_scenarios
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand_spec
-from mutator.model import ConcreteScenario, Experiment, Fault, Method, Trigger
+from mutator.model import Experiment, Fault, Method, Trigger
 from mutator.operators.executed_lines_and_types import GoldenRunInputs
-from mutator.results.table_columns import check_parameter_names
 from mutator.store.golden_runs import GoldenRun
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger, draw_trigger_time, trigger_at_time
@@ -47,12 +39,11 @@ class CampaignExpansion:
         self.workspace = workspace
         self.campaign = campaign
         self.manifest = manifest
-        self.seed = self._first_seed = seed
+        self.seed = seed
         self.reading = reading
         armed_after_s = campaign.armed_after_s_in(reading)
         self.armed_after_s = manifest.armed_after_s if armed_after_s is None else armed_after_s
-        self._digest_and_concrete_by_scenario: dict[str, tuple[str, ConcreteScenario | None]] = {}
-        self._temporary_scenarios: list[ScratchFolder] = []  # concrete scenarios, if operators drive them
+        self.scenarios = CampaignScenarios(workspace, campaign, manifest, seed)
         self._library_specs: list[tuple[FaultSpec, ...]] = []
         self._fault_models = workspace.fault_models()
         self._operator_faults = OperatorFaultFinder(manifest, self._fault_models, campaign.golden_run_limits)
@@ -75,7 +66,7 @@ class CampaignExpansion:
         triggers = self._campaign_triggers()
         ordered = [
             (order, experiment)
-            for order, scenario in enumerate(self._scenarios)
+            for order, scenario in enumerate(self.scenarios.names)
             for experiment in (
                 *self._experiments_of_faults(scenario, faults, triggers),
                 *self._experiments_of_operator_faults(scenario, operator_faults, triggers),
@@ -88,8 +79,8 @@ class CampaignExpansion:
     def fault_free_drives(self, *, several_seeds: bool) -> Iterator[FaultFreeDrive]:
         """Yield the golden run of each scenario."""
         self._check_change_names()
-        for name in self._scenarios:
-            scenario_digest, concrete = self._digest_and_concrete(name)
+        for name in self.scenarios.names:
+            scenario_digest, concrete = self.scenarios.digest_and_concrete(name)
             seed = self.seed if several_seeds else None
             golden_run = GoldenRun(name, self.campaign.changes_in(self.reading), seed)
             yield FaultFreeDrive(golden_run=golden_run, scenario_digest=scenario_digest, concrete=concrete)
@@ -201,7 +192,7 @@ class CampaignExpansion:
         operator_fault_by_id: dict[str, OperatorFault] = {}
         for i, selection in enumerate(self.campaign.fault_selections):
             if selection.operator_selection is not None:
-                with self._errors_located_at(("faults", i, "in")):
+                with self.campaign.locating_errors(("faults", i, "in")):
                     operator_faults = self._operator_faults.faults_of_selection(
                         selection.operator_selection,
                         self._golden_inputs_by_scenario(),
@@ -219,47 +210,12 @@ class CampaignExpansion:
     def _golden_inputs_by_scenario(self) -> dict[str, GoldenRunInputs]:
         return {
             name: GoldenRunInputs(
-                scenario=self._file_of_any_scenario(name),
+                scenario=self.scenarios.file(name),
                 changes=self.campaign.changes_in(self.reading),
                 seed=self.seed,
             )
-            for name in self._scenarios
+            for name in self.scenarios.names
         }
-
-    @cached_property
-    def _scenarios(self) -> tuple[str, ...]:
-        """The names of all scenarios. Those of families are drawn with the plan's first seed."""
-        names: list[str] = []
-        for i, selection in enumerate(self.campaign.scenario_selections):
-            if isinstance(selection, str):
-                names.append(selection)
-                continue
-            family = self._family_by_place[i]
-            with self._errors_located_at(("scenarios", i, "family")):
-                drawn = sample_scenarios(
-                    family, selection.count, selection.sampling or family.sampling, self._first_seed
-                )
-            self._digest_and_concrete_by_scenario |= {s.name: (s.digest, s) for s in drawn}
-            names += [scenario.name for scenario in drawn]
-        return tuple(names)
-
-    @property
-    def families(self) -> tuple[FamilyFacts, ...]:
-        """The families from which the campaign draws scenarios, in the order of the file."""
-        return tuple(family.facts for family in self._family_by_place.values())
-
-    @cached_property
-    def _family_by_place(self) -> dict[int, Family]:
-        """The families by their places in the campaign's list of scenarios."""
-        families: dict[int, Family] = {}
-        for i, selection in enumerate(self.campaign.scenario_selections):
-            if isinstance(selection, str):
-                continue
-            with self._errors_located_at(("scenarios", i, "family")):
-                name = checked_name_not_path(selection.family, self.campaign.path)
-                families[i] = self.workspace.family(name)
-                check_parameter_names(self.manifest, families[i].facts)
-        return families
 
     def _unmatched_pattern_error(
         self, keys: KeyPath, pattern: str, library: Sequence[_NumberedFault] = ()
@@ -283,10 +239,10 @@ class CampaignExpansion:
                 armed_after_s=self.armed_after_s,
                 hold_s=self.campaign.hold_s,
             )
-        with self._errors_located_at(("triggers", "table")):
+        with self.campaign.locating_errors(("triggers", "table")):
             variables = self.manifest.observation.variables
             table = self.workspace.context_table(self.campaign.context_table, variables)
-        with self._errors_located_at(("triggers", "rows")):
+        with self.campaign.locating_errors(("triggers", "rows")):
             return table.triggers(
                 hold_s=self.campaign.hold_s, armed_after_s=self.armed_after_s, rows=self.campaign.context_ids
             )
@@ -347,7 +303,7 @@ class CampaignExpansion:
         return trigger_at_time(time, name=f"random/{paired_trigger.name}", hold_s=self.campaign.hold_s)
 
     def _build_experiment(self, fault: Fault, scenario: str, method: Method, trigger: Trigger) -> Experiment:
-        scenario_digest, concrete = self._digest_and_concrete(scenario)
+        scenario_digest, concrete = self.scenarios.digest_and_concrete(scenario)
         return Experiment(
             fault=fault,
             scenario=scenario,
@@ -359,48 +315,3 @@ class CampaignExpansion:
             after_hazard=self.campaign.after_hazard,
             concrete=concrete,
         )
-
-    def _digest_and_concrete(self, scenario: str) -> tuple[str, ConcreteScenario | None]:
-        if scenario not in self._digest_and_concrete_by_scenario:
-            scenario_digest = digest(read_bounded(self._scenario_file(scenario)))
-            self._digest_and_concrete_by_scenario[scenario] = scenario_digest, None
-        return self._digest_and_concrete_by_scenario[scenario]
-
-    def _file_of_any_scenario(self, name: str) -> Path:
-        """Return the file of a scenario; that of a family is in a temporary folder."""
-        _, concrete = self._digest_and_concrete(name)
-        if concrete is None:
-            return self._scenario_file(name)
-        if not self._temporary_scenarios:
-            self._temporary_scenarios.append(ScratchFolder("mutator-scenarios-"))
-        path = path_below(self._temporary_scenarios[0].path, f"{name}.yaml")
-        path.write_text(concrete.text)
-        return path
-
-    def _scenario_file(self, scenario: str) -> Path:
-        scenarios = self.workspace.scenarios
-        if scenario not in scenarios:  # a file outside the library could change, or differ on another machine
-            raise self.campaign.error(
-                self._scenario_key_path(scenario),
-                f"no scenario '{scenario}' in the library",
-                expected=describe_choices(scenarios),
-                remedy="correct the name, or add the file to the library's scenarios/",
-            )
-        return self.workspace.scenario(scenario)
-
-    @contextmanager
-    def _errors_located_at(self, keys: KeyPath) -> Iterator[None]:
-        """Point errors without a line number to `keys` in the campaign file; leave others unchanged."""
-        try:
-            yield
-        except MutatorError as err:
-            if err.line is not None:
-                raise
-            raise self.campaign.error(
-                keys, err.got, expected=err.expected or "", remedy=err.remedy or "correct the name"
-            ) from None
-
-    def _scenario_key_path(self, scenario: str) -> KeyPath:
-        if scenario in self.campaign.scenarios:
-            return ("scenarios", self.campaign.scenario_selections.index(scenario))
-        return ("canary", "scenario")

@@ -1,6 +1,7 @@
 """Campaign files: the faults, scenarios, triggers and limits of a campaign."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -125,6 +126,18 @@ class Campaign:
     def keys_of_changes(self, reading: str) -> KeyPath:
         """Return where the campaign file has the value of `changes_in`."""
         return ("setting", reading) if reading in self.changes_by_reading else ("setting",)
+
+    @contextmanager
+    def locating_errors(self, keys: KeyPath) -> Iterator[None]:
+        """Point errors without a line number to `keys` of the campaign file; leave others unchanged."""
+        try:
+            yield
+        except MutatorError as err:
+            if err.line is not None:
+                raise
+            raise self.error(
+                keys, err.got, expected=err.expected or "", remedy=err.remedy or "correct the name"
+            ) from None
 
     def error(self, keys: KeyPath, got: str, *, expected: str, remedy: str) -> MutatorError:
         """Return an error at `keys` of the campaign file; the caller raises it."""

@@ -199,7 +199,7 @@ class SeedBySeedPlan:
     @property
     def families(self) -> tuple[FamilyFacts, ...]:
         """The families that give scenarios."""
-        return self._expansion.families
+        return self._expansion.scenarios.families
 
     def empty_tally(self) -> PlanTally:
         return PlanTally(canary=self.canary, has_several_seeds=len(self.seeds) > 1, drives=self.drives)

@@ -7,15 +7,11 @@ from contextlib import contextmanager
 from mutator._common.files import raising_disk_full
 from mutator.errors import CheckFailed, DiskFull, MutatorWarning
 from mutator.execution.golden_facts import GoldenFacts
+from mutator.preflight.check_judgements import loaded_packages, unpackaged_modules
 from mutator.preflight.check_run_problems import CheckRun
 from mutator.preflight.checks_beside_experiments import ChecksBesideExperiments, begin_checks
 from mutator.preflight.failed_golden_run_pages import with_golden_run_pages
-from mutator.preflight.preflight_checks import (
-    describe_unreached_triggers,
-    loaded_packages,
-    run_checks,
-    unpackaged_modules,
-)
+from mutator.preflight.preflight_checks import describe_unreached_triggers, run_checks
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
 from mutator.targets.manifest import TargetManifest

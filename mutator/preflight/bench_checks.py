@@ -19,15 +19,15 @@ from mutator.engines.run_limits import measure_limits
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Experiment, Fault
 from mutator.preflight import preflight_cache
-from mutator.preflight.check_run_problems import output_digest_of
-from mutator.preflight.preflight_check_runner import GOLDEN, CheckRunner
-from mutator.preflight.preflight_checks import (
+from mutator.preflight.check_judgements import (
     anchor_problem,
     build_check_result,
     golden_run_results,
     loaded_packages,
     unpackaged_modules,
 )
+from mutator.preflight.check_run_problems import output_digest_of
+from mutator.preflight.preflight_check_runner import GOLDEN, CheckRunner
 from mutator.store import file_digests
 from mutator.store.checks_file import (
     CHECKED_GOLDENS_KEY,

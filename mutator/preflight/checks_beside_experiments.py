@@ -13,6 +13,7 @@ from typing import Any
 
 from mutator.errors import CheckFailed
 from mutator.preflight.canary_check import CanaryVerdict
+from mutator.preflight.check_judgements import golden_run_results
 from mutator.preflight.check_run_problems import CheckRun
 from mutator.preflight.preflight_check_runner import (
     CANARY,
@@ -22,12 +23,7 @@ from mutator.preflight.preflight_check_runner import (
     CheckRunByName,
     OnProgress,
 )
-from mutator.preflight.preflight_checks import (
-    PreflightChecks,
-    golden_run_results,
-    raise_if_failed,
-    run_checks,
-)
+from mutator.preflight.preflight_checks import PreflightChecks, raise_if_failed, run_checks
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.preflight_results import CheckResult
 from mutator.store.run_folder import RunFolder

@@ -1,7 +1,7 @@
 """The checks that must pass before a campaign starts: equal golden runs, null mutants, canary, anchors."""
 
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,27 +17,27 @@ from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import scenarios_sharing_runs
 from mutator.engines.observation_store import ObservationStore
-from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
-from mutator.faults.fault_models import FaultModels
-from mutator.model import Fault, GoldenClass, Limits
-from mutator.mutants.mutant_building import build
+from mutator.errors import CheckFailed, DiskFull, MutatorError
+from mutator.model import Limits
 from mutator.preflight import preflight_cache, unreached_triggers
 from mutator.preflight.canary_check import CanaryVerdict
+from mutator.preflight.check_judgements import (
+    anchor_problem,
+    anchor_result,
+    build_check_result,
+    golden_run_results,
+    loaded_packages,
+    unpackaged_modules,
+)
 from mutator.preflight.check_run_problems import (
     CheckRun,
     equal_scenarios_problem,
-    forked_run_problem,
-    golden_pair_problem,
-    null_mutant_problem,
     output_digest_of,
     verdict_of,
 )
 from mutator.preflight.forked_golden_runs import describe_family_runs
 from mutator.preflight.preflight_check_runner import (
-    FORKED,
     GOLDEN,
-    GOLDEN_AGAIN,
-    NULL_MUTANT,
     CheckRunByName,
     CheckRunner,
     OnProgress,
@@ -47,7 +47,6 @@ from mutator.store.checks_file import (
     CHECKS_FILE,
     CHECKS_SCHEMA,
     MEASURED_LIMITS_KEY,
-    describe_golden_hazards,
     golden_hazards_as_json,
     measured_limits_as_json,
     unpackaged_modules_as_json,
@@ -58,7 +57,6 @@ from mutator.store.golden_verdicts import GOLDEN_VERDICTS_KEY
 from mutator.store.preflight_results import CheckResult
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 
@@ -369,56 +367,6 @@ class PreflightChecks:
         return anchor_result(problem, len(self.fault_by_variant))
 
 
-def golden_run_results(runs: CheckRunByName, key: GoldenRun) -> Iterator[CheckResult]:
-    """Judge the two golden runs and the null mutant of a golden run."""
-    first, again, null = (runs[name, key] for name in (GOLDEN, GOLDEN_AGAIN, NULL_MUTANT))
-    detail, success = golden_pair_problem(first, again), "the same bytes twice"
-    if first.hazards:
-        success += f"; {GoldenClass.HAZARD_WITHOUT_FAULT}: {describe_golden_hazards(first.hazards)}"
-    yield build_check_result(f"golden {key.key}", detail, success)
-    if not first.problem:
-        detail = null_mutant_problem(first, null)
-        yield build_check_result(f"null mutant {key.key}", detail, "the same bytes as golden")
-        if (forked := runs.get((FORKED, key))) is not None and forked is not first:
-            yield build_check_result(
-                f"fork {key.key}", forked_run_problem(first, forked), "the same bytes as golden"
-            )
-
-
-def anchor_problem(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> str:
-    """Return which variants do not find their statements; empty if all do. A mutant that does not compile
-    has found them.
-    """
-    problems: dict[str, list[str]] = {}
-    for fault in faults:
-        try:
-            build(manifest, models, fault, always_trigger())
-        except InvalidMutant:
-            continue
-        except MutatorError as err:
-            problems.setdefault(str(err), []).append(fault.spec)
-    return "; ".join(f"{', '.join(specs)}: {problem}" for problem, specs in problems.items())
-
-
-def anchor_result(problem: str, variant_count: int) -> CheckResult:
-    return build_check_result("anchors", problem, f"{variant_count} variants found their statements")
-
-
-def loaded_packages(manifest: TargetManifest, golden_runs: Iterable[CheckRun]) -> list[str]:
-    """Return the packages that golden runs loaded, without the target and the standard library."""
-    return list(run_environment.packages_of_modules(_third_party_modules(manifest, golden_runs)))
-
-
-def unpackaged_modules(manifest: TargetManifest, golden_runs: Iterable[CheckRun]) -> tuple[str, ...]:
-    """Return the modules that golden runs loaded from outside the target and that no package provides."""
-    return run_environment.modules_without_package(_third_party_modules(manifest, golden_runs))
-
-
-def _third_party_modules(manifest: TargetManifest, golden_runs: Iterable[CheckRun]) -> set[str]:
-    loaded = {module for run in golden_runs for module in run.third_party_modules}
-    return loaded - {path.split("/")[0].removesuffix(".py") for path in manifest.tree.files}
-
-
 def _limits_that_checks_depend_on(campaign: Campaign) -> dict[str, Any] | Limits:
     """Return the limits without those that golden runs determine: these only cut runs off."""
     measured_names = campaign.measured_limit_names
@@ -431,7 +379,3 @@ def _limits_of_earlier_session(stored: Mapping[str, Any] | None) -> dict[str, An
     """Return the limits in stored checks, which runs may have used; nothing if a check failed."""
     is_used = stored is not None and all(result["passed"] for result in stored["results"])
     return {key: stored[key] for key in (MEASURED_LIMITS_KEY,) if is_used and stored and key in stored}
-
-
-def build_check_result(name: str, problem: str, success: str) -> CheckResult:
-    return CheckResult(name=name, passed=not problem, detail=problem or success)
