@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mutator.model import Limits
+from mutator.limits import Limits
 from mutator.store.plan_choices import Choices
 from mutator.store.run_head import RUN_SCHEMA, Provenance, RunHead
 

@@ -17,7 +17,8 @@ from mutator.api.target_and_fault_selection import (
     WorkspaceLike,
 )
 from mutator.errors import MutatorError
-from mutator.model import MOST_LIMIT_OR_TIME, AfterHazard, Experiment, Fault, Hold, Method, Trigger
+from mutator.limits import MOST_LIMIT_OR_TIME
+from mutator.model import AfterHazard, Experiment, Fault, Hold, Method, Trigger
 from mutator.triggers.conditions import canonical_condition
 from mutator.triggers.trigger_kinds import CONDITION_NAME, held_for, named_with_hold
 

@@ -8,7 +8,8 @@ from mutator._common.message_text import counted
 from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.engines.run_limits import limits_before_measuring
 from mutator.errors import MutatorError
-from mutator.model import Fault, Limits
+from mutator.limits import Limits
+from mutator.model import Fault
 from mutator.operators.executed_lines_and_types import (
     GoldenRunInputs,
     measure_executed_lines,

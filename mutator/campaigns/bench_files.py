@@ -15,7 +15,8 @@ from mutator.campaigns.campaign_model import Canary
 from mutator.campaigns.campaign_triggers import EVERY_READING
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.errors import MutatorError
-from mutator.model import AfterHazard, GoldenClass, Limits, Method
+from mutator.limits import Limits
+from mutator.model import AfterHazard, GoldenClass, Method
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
 

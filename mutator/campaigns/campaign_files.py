@@ -24,7 +24,8 @@ from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring
 from mutator.errors import MutatorError
 from mutator.faults.library_readings import SpecReadings
-from mutator.model import AfterHazard, GoldenClass, Limits, Method
+from mutator.limits import Limits
+from mutator.model import AfterHazard, GoldenClass, Method
 from mutator.targets.hazard_severity import SeverityScale
 
 SCHEMA = "campaign/1"

@@ -27,7 +27,8 @@ from mutator.campaigns.expectations import Expectation
 from mutator.campaigns.operator_selection import MutantActivity
 from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.families.scenario_sampling import SAMPLING_METHODS
-from mutator.model import AfterHazard, Limits, Method
+from mutator.limits import Limits
+from mutator.model import AfterHazard, Method
 
 
 def _validated_operator(name: str) -> str:

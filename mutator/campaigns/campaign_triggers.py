@@ -10,7 +10,8 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.config.yaml_source_lines import KeyPath, YamlSource
-from mutator.model import MOST_LIMIT_OR_TIME, Trigger
+from mutator.limits import MOST_LIMIT_OR_TIME
+from mutator.model import Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import canonical_condition
 from mutator.triggers.trigger_kinds import always_trigger, held_for, named_with_hold, trigger_at_time

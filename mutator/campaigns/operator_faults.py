@@ -8,7 +8,8 @@ from mutator._common.message_text import counted
 from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.model import Fault, Limits
+from mutator.limits import Limits
+from mutator.model import Fault
 from mutator.operators.executed_lines_and_types import (
     ExecutedLinesByFile,
     GoldenRunInputs,

@@ -29,7 +29,8 @@ from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
 from mutator.errors import MutatorError
 from mutator.families.family_facts import FamilyFacts
-from mutator.model import AfterHazard, Experiment, MeasuredLimits
+from mutator.limits import MeasuredLimits
+from mutator.model import AfterHazard, Experiment
 from mutator.results.plan_columns import columns_of_plan, plan_column_names, plan_row
 from mutator.store import plan_file
 from mutator.store.golden_runs import GoldenRun

@@ -31,7 +31,8 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import limits_before_measuring, measure_limits
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import NotForkable
-from mutator.model import Experiment, GoldenClass, Limits
+from mutator.limits import Limits
+from mutator.model import Experiment, GoldenClass
 from mutator.mutants.injected_line_syntax import target_line_of
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe_contract import is_probe_path

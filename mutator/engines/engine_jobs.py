@@ -10,7 +10,8 @@ from typing import Any, Protocol
 
 from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.faults.fault_models import FaultModels
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
 from mutator.mutants.injected_line_syntax import place_in_target
 from mutator.mutants.probe_contract import ProbeSource, is_probe_path, report_problem
 from mutator.targets.manifest import TargetManifest

@@ -31,10 +31,9 @@ from mutator.engines.engine_jobs import (
     RunMode,
     harness_error_result,
 )
-from mutator.engines.executed_functions import ExecutedFunctions
 from mutator.engines.first_activation import ForkPoint, GoldenObservations, find_fork_point
 from mutator.engines.fork_messages import SharedParts, fork_request
-from mutator.engines.fork_results import ForkResults
+from mutator.engines.fork_results import ForkResults, golden_result_of_inactive_fault
 from mutator.engines.fork_server_processes import (
     ForkServer,
     GoldenRunRequest,
@@ -57,9 +56,10 @@ from mutator.engines.received_fork_output import ReceivedForkOutput
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import ForkServerLost, MutantNotSwappable, NotForkable
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
 from mutator.mutants.mutant_building import Mutant, build
-from mutator.mutants.probe_contract import ProbeSource, untriggered_report
+from mutator.mutants.probe_contract import ProbeSource
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 
@@ -194,7 +194,7 @@ class ForkEngine:
                 # the run stops before the fault is active, and so before a fork
                 return self._fork_before_first_step(job, folder, swap)
         if fork_point is None:
-            return _golden_result_of_inactive_fault(job, job.golden_folder, observations.executed_functions)
+            return golden_result_of_inactive_fault(job, job.golden_folder, observations.executed_functions)
         return self._run_in_fork(
             self._process_before_step(job, fork_point.step, swap), job, folder, swap, fork_point
         )
@@ -370,21 +370,6 @@ _BEFORE_FIRST_STEP = ForkPoint(step=0, observation_count=0, earliest_time_s=None
 
 def _modules_to_load(swap: CodeSwap) -> list[str]:
     return [*dict.fromkeys(function.module for function in swap.functions), *swap.imported_modules]
-
-
-def _golden_result_of_inactive_fault(
-    job: Job, golden: Path, executed_functions: ExecutedFunctions | None
-) -> JobResult:
-    return JobResult(
-        status=Status.OK,
-        detail="",
-        out=golden,
-        probe_report=untriggered_report(job.mutant_id),
-        executed_functions=executed_functions,
-        cpu_s=0.0,
-        wall_s=0.0,
-        mode=RunMode.GOLDEN_REUSED,
-    )
 
 
 def make_fork_engine(arguments: EngineArguments) -> ForkEngine:

@@ -9,7 +9,7 @@ from mutator.engines.first_activation import ForkPoint
 from mutator.engines.job_folder import JobFolder
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import NotForkable
-from mutator.model import Limits
+from mutator.limits import Limits
 from mutator.mutants.probe_contract import probe_attributes_after, probe_module
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_at_hazard_code import stop_function_source

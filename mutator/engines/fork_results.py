@@ -6,7 +6,7 @@ from typing import Any
 from mutator._common.files import disk_full_error
 from mutator.engines.crashes_in_forks import judge_crash
 from mutator.engines.engine_jobs import Job, JobResult, RunMode
-from mutator.engines.executed_functions import executed_functions_from_json
+from mutator.engines.executed_functions import ExecutedFunctions, executed_functions_from_json
 from mutator.engines.fork_messages import check_fork_report
 from mutator.engines.job_folder import JobFolder
 from mutator.engines.observation_store import OBSERVATION_KEYS
@@ -20,7 +20,9 @@ from mutator.engines.process_endings import (
 )
 from mutator.engines.received_fork_output import ReceivedForkOutput
 from mutator.errors import NotForkable
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
+from mutator.mutants.probe_contract import untriggered_report
 
 
 class ForkResults:
@@ -82,3 +84,19 @@ class ForkResults:
 def _describe_crash(report: dict[str, Any] | None, detail: str) -> str:
     raised = exception_in_report(report) if report else None
     return f"ended as crashed: {raised.description_without_place if raised else detail}"
+
+
+def golden_result_of_inactive_fault(
+    job: Job, golden: Path, executed_functions: ExecutedFunctions | None
+) -> JobResult:
+    """Return the result of a fault that is never active: that of the golden run, without a run."""
+    return JobResult(
+        status=Status.OK,
+        detail="",
+        out=golden,
+        probe_report=untriggered_report(job.mutant_id),
+        executed_functions=executed_functions,
+        cpu_s=0.0,
+        wall_s=0.0,
+        mode=RunMode.GOLDEN_REUSED,
+    )

@@ -17,7 +17,8 @@ from mutator._common.files import is_disk_full_error
 from mutator.engines.engine_jobs import Job, RaisedException, innermost_position
 from mutator.engines.in_target import process_guard
 from mutator.errors import MutatorError, UnsafePath
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
 from mutator.targets.process_environment import FIXED_VARIABLES, INHERITED_VARIABLES
 
 KILLED_DETAIL, EXITED_DETAIL = (

@@ -44,7 +44,8 @@ from mutator.engines.process_endings import (
     without_run_specifics,
 )
 from mutator.engines.sandbox import Sandbox
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
 from mutator.mutants.parsed_files_and_anchors import parsed_file
 from mutator.mutants.probe_contract import probe_attributes_after, probe_module
 from mutator.targets.manifest import TargetManifest

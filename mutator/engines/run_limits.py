@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import asdict, replace
 from math import ceil
 
-from mutator.model import Limits, MeasuredLimits
+from mutator.limits import Limits, MeasuredLimits
 
 LIMITS_THAT_ARE_MEASURED = frozenset({"cpu_s", "wall_s"})
 _GOLDEN_RUNS_PER_LIMIT = 10  # a faulty run may take this many times the CPU time of its golden run

@@ -4,13 +4,11 @@
 """
 
 import os
-import re
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
-from itertools import chain
 from secrets import token_bytes
 
 from mutator._common.bounded_reading import read_bounded
@@ -45,6 +43,7 @@ from mutator.execution.session_proof import prove_rest_of_sample, remaining_proo
 from mutator.execution.session_reuse import SessionReuse, count_reused
 from mutator.execution.session_summary import Summary
 from mutator.execution.worker import Worker, WorkerAssignment, WorkerStart
+from mutator.execution.worker_names import new_worker_prefix, unused_worker_name
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Outcome, Record
 from mutator.preflight import equivalence_check
@@ -56,7 +55,7 @@ from mutator.results.worst_first_ranking import worst_first_rank_by_ok_experimen
 from mutator.store import file_digests
 from mutator.store.file_digests import FileDigest
 from mutator.store.preflight_results import are_verdicts_provisional, golden_digests
-from mutator.store.records import LINE_SCHEMA_BY_FOLDER, endings_of
+from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.store.run_progress import Progress, ProgressCallback, progress_label
@@ -101,7 +100,7 @@ class Session:
             else None
         )
         self._unselected_count = 0  # experiments without a record that are left for another session
-        self.worker_prefix = self._new_worker_prefix()  # of the names of this session's workers
+        self.worker_prefix = new_worker_prefix(folder.path)  # of the names of this session's workers
         self.problem = ""
         self.interrupted = False
         self.secret = token_bytes(_SECRET_BYTES)
@@ -216,20 +215,9 @@ class Session:
                 remedy="it is restored: ask again",
             )
 
-    def _new_worker_prefix(self) -> str:
-        """Return a prefix that the worker names of no earlier session had."""
-        files = chain.from_iterable(
-            (self.folder.path / kind).glob("*.jsonl") for kind in LINE_SCHEMA_BY_FOLDER
-        )
-        used_numbers = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
-        return f"{max(used_numbers, default=0) + 1:04d}-"
-
     def unused_worker_name(self, name: str) -> str:
         """Return a name like `0001-cluster`, or `0001-cluster2`, that no worker of this session has had."""
-        kinds = LINE_SCHEMA_BY_FOLDER
-        used = {path.stem for kind in kinds for path in (self.folder.path / kind).glob("*.jsonl")}
-        names = (f"{self.worker_prefix}{name}{number}" for number in ("", *range(2, len(used) + 3)))
-        return next(unused for unused in names if unused not in used)
+        return unused_worker_name(self.folder.path, f"{self.worker_prefix}{name}")
 
     @property
     def inputs(self) -> RunInputs:

@@ -20,7 +20,8 @@ from mutator.execution.experiment_runner import ExperimentRunner, RecordedExperi
 from mutator.execution.golden_hazards import GoldenHazardRules
 from mutator.execution.inactivity_check import InactivityCheck
 from mutator.execution.loaded_goldens import LoadedGoldens
-from mutator.model import Experiment, GoldenClass, Limits, Record, Status
+from mutator.limits import Limits
+from mutator.model import Experiment, GoldenClass, Record, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.preflight.check_run_problems import read_check_run
 from mutator.store import plan_file

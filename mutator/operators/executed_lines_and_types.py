@@ -19,7 +19,8 @@ from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
 from mutator.operators.interchangeable_variables import TypesByName
 from mutator.targets.manifest import TargetManifest
 

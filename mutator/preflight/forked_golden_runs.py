@@ -14,7 +14,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.fork_engine import ForkEngine
-from mutator.model import Limits
+from mutator.limits import Limits
 from mutator.mutants.mutant_building import Mutant
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.planned_scenarios import PlannedScenarios

@@ -23,7 +23,8 @@ from mutator.engines.observation_store import ObservationStore, observations_of_
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import measure_limits
 from mutator.errors import ForkServerLost, NotForkable
-from mutator.model import Experiment, Limits, Status
+from mutator.limits import Limits
+from mutator.model import Experiment, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.preflight import canary_check, unreached_triggers
 from mutator.preflight.check_run_problems import CheckRun, null_mutant_problem, read_check_run

@@ -18,7 +18,7 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import scenarios_sharing_runs
 from mutator.engines.observation_store import ObservationStore
 from mutator.errors import CheckFailed, DiskFull, MutatorError
-from mutator.model import Limits
+from mutator.limits import Limits
 from mutator.preflight import preflight_cache, unreached_triggers
 from mutator.preflight.canary_check import CanaryVerdict
 from mutator.preflight.check_judgements import (

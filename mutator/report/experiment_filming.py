@@ -20,7 +20,8 @@ from mutator.engines.sandbox import Sandbox
 from mutator.errors import MutatorError
 from mutator.execution.single_run import is_same_record, manifest_of_unchanged_target, run_golden, run_single
 from mutator.figures.golden_and_faulty_plot import event_marks
-from mutator.model import Experiment, Limits, MeasuredLimits, Record
+from mutator.limits import Limits, MeasuredLimits
+from mutator.model import Experiment, Record
 from mutator.store.run_folder import RunFolder
 from mutator.targets.command_placeholders import fill_placeholders
 from mutator.targets.manifest import FILM_FOLDER, TargetManifest

@@ -28,7 +28,8 @@ from mutator.engines.in_target import picture_probe
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.model import Fault, FaultLocation, Injection, Limits, Status
+from mutator.limits import Limits
+from mutator.model import Fault, FaultLocation, Injection, Status
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe_contract import probe_path
 from mutator.mutants.template_rendering import render_snippet

@@ -7,7 +7,7 @@ from pathlib import Path
 from mutator._common.files import read_json
 from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED
 from mutator.errors import MutatorError
-from mutator.model import MOST_LIMIT_OR_TIME, Limits, MeasuredLimits
+from mutator.limits import MOST_LIMIT_OR_TIME, Limits, MeasuredLimits
 
 CHECKS_SCHEMA = "checks/1"
 CHECKS_FILE = "checks.json"

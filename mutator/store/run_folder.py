@@ -17,7 +17,8 @@ from mutator._common.hashing import as_json_types
 from mutator._common.library_and_run_folder_search import SCRATCH_FOLDER
 from mutator._common.message_text import shortened_ids
 from mutator.errors import MutatorError
-from mutator.model import AfterHazard, Experiment, Limits, Record
+from mutator.limits import Limits
+from mutator.model import AfterHazard, Experiment, Record
 from mutator.store import file_digests, integrity, plan_file
 from mutator.store.allowed_contents import TRACES_FOLDER
 from mutator.store.appended_files import unfinished_growth_problems

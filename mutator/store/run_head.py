@@ -12,7 +12,8 @@ from mutator._common.library_and_run_folder_search import RUN_HEAD_FILE
 from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError, TypeMisfit
 from mutator.families.family_facts import FamilyFacts
-from mutator.model import GoldenClass, Limits
+from mutator.limits import Limits
+from mutator.model import GoldenClass
 from mutator.store.golden_runs import StoredGolden
 from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import Chunk

@@ -12,18 +12,8 @@ import pytest
 from mutator.engines.engine_choice import make_engine
 from mutator.engines.engine_jobs import Engine, EngineArguments, Job, JobResult, RunMode
 from mutator.engines.engine_kinds import ENGINES
-from mutator.model import (
-    Anchor,
-    AnchorKind,
-    Fault,
-    FaultLocation,
-    Hold,
-    Injection,
-    Limits,
-    Status,
-    Trigger,
-    Value,
-)
+from mutator.limits import Limits
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Status, Trigger, Value
 from mutator.mutants.mutant_building import build
 from mutator.mutants.parsed_files_and_anchors import parsed_file
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time

@@ -12,6 +12,7 @@ from mutator.engines.engine_kinds import ENGINES
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.experiment_runner import ExperimentRunner
 from mutator.execution.loaded_goldens import LoadedGoldens
+from mutator.limits import Limits
 from mutator.model import (
     Anchor,
     AnchorKind,
@@ -19,7 +20,6 @@ from mutator.model import (
     Fault,
     FaultLocation,
     Injection,
-    Limits,
     Method,
     Record,
     Status,

@@ -11,7 +11,8 @@ import pytest
 
 from mutator.engines.engine_jobs import JobResult, RunMode
 from mutator.engines.engine_kinds import ENGINES
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
 from mutator.workspace import Workspace
 
 from .test_engines import LIMITS, MODELS, TRIGGERS, Engines, fault

@@ -18,7 +18,7 @@ from mutator.execution.cluster.bundle import Bundle
 from mutator.execution.cluster.worker_calls import call_on_worker, submit_to_worker
 from mutator.execution.cluster.worker_roster import WorkerRoster
 from mutator.execution.session import Session
-from mutator.model import Limits
+from mutator.limits import Limits
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.run_folder import RunFolder
 

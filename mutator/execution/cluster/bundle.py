@@ -33,7 +33,7 @@ from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.execution.cluster.unpacked_bundle import BUNDLE_SCHEMA, META_FILE, UnpackedBundle
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import TEMPLATE_FOLDER_GLOBS
-from mutator.model import MeasuredLimits
+from mutator.limits import MeasuredLimits
 from mutator.results.table_columns import check_column_names
 from mutator.store.checks_file import CHECKS_FILE as CHECKS
 from mutator.store.checks_file import CHECKS_SCHEMA

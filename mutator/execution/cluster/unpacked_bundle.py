@@ -10,7 +10,8 @@ from mutator._common.files import read_json
 from mutator._common.typed_json import typed_value_from_json
 from mutator.errors import MutatorError
 from mutator.execution.golden_hazards import GoldenHazardRules
-from mutator.model import GoldenClass, Limits, MeasuredLimits
+from mutator.limits import Limits, MeasuredLimits
+from mutator.model import GoldenClass
 from mutator.store.golden_runs import GoldenRun
 from mutator.targets.hazard_severity import SeverityScale
 

@@ -7,7 +7,8 @@ from pathlib import Path
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.fork_server_processes import ForkServer
-from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Trigger
+from mutator.limits import Limits
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger

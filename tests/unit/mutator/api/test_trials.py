@@ -6,7 +6,8 @@ import pytest
 
 import mutator
 from mutator.errors import MutatorError
-from mutator.model import MeasuredLimits, Outcome, Status
+from mutator.limits import MeasuredLimits
+from mutator.model import Outcome, Status
 from mutator.workspace import Workspace
 
 

@@ -12,7 +12,8 @@ from mutator.campaigns.campaign_files import load_campaign
 from mutator.campaigns.plan import Plan, build_plan, load_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.errors import MutatorError
-from mutator.model import Hold, Limits, Method
+from mutator.limits import Limits
+from mutator.model import Hold, Method
 from mutator.operators.executed_lines_and_types import ExecutedLinesByFile, GoldenRunInputs
 from mutator.review.mutant_groups import groups_of_plan
 from mutator.store.plan_choices import Choices

@@ -11,7 +11,8 @@ from mutator.engines.engine_jobs import EngineArguments, RunMode
 from mutator.execution.experiment_runner import ExperimentRunner, RecordedExperiment
 from mutator.execution.inactivity_check import InactivityCheck
 from mutator.execution.loaded_goldens import LoadedGoldens
-from mutator.model import Limits, Outcome
+from mutator.limits import Limits
+from mutator.model import Outcome
 from mutator.workspace import Workspace
 from tests.small_loop import small_loop
 from tests.unit.mutator.execution.test_inactivity_check import AT_LAW, FORKING, LAW, REASONS, controller

@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.model import Limits
+from mutator.limits import (Limits)
 from mutator.workspace import Workspace
 library, templates, folder, note = map(Path, sys.argv[1:])
 toycar = Workspace(library=library, templates=templates)

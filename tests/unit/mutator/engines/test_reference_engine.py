@@ -16,7 +16,8 @@ from mutator.engines import pyc_files
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import DiskFull, MutatorError
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -3,7 +3,7 @@
 import pytest
 
 from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring, measure_limits
-from mutator.model import Limits, MeasuredLimits
+from mutator.limits import Limits, MeasuredLimits
 
 OWN = Limits(steps=6000)
 

@@ -15,7 +15,8 @@ from mutator.engines.engine_jobs import Job, JobResult, RunMode
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.sandbox import Sandbox
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
 from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 

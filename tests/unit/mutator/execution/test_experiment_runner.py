@@ -17,6 +17,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.execution.experiment_runner import ExperimentRunner
 from mutator.execution.loaded_goldens import LoadedGoldens
+from mutator.limits import Limits
 from mutator.model import (
     Anchor,
     AnchorKind,
@@ -24,7 +25,6 @@ from mutator.model import (
     Fault,
     FaultLocation,
     Injection,
-    Limits,
     Method,
     ObservedActivation,
     Outcome,

@@ -11,7 +11,7 @@ import pytest
 
 from mutator.errors import MutatorError, UnsafePath
 from mutator.execution.shard_merging import _merged_checks, merge_shards
-from mutator.model import Limits, MeasuredLimits
+from mutator.limits import Limits, MeasuredLimits
 from mutator.store import file_digests
 from mutator.store.checks_file import CHECKS_FILE, CHECKS_SCHEMA, limits_of_run
 from mutator.store.file_digests import FileDigest

@@ -8,7 +8,8 @@ from mutator._common import cache_layout_and_pruning
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
 from mutator.operators import executed_lines_and_types
 from mutator.operators.executed_lines_and_types import GoldenRunInputs, measure_executed_lines
 from mutator.workspace import Workspace

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 import mutator
-from mutator.model import Limits, Status
+from mutator.limits import Limits
+from mutator.model import Status
 from mutator.operators.executed_lines_and_types import GoldenRunInputs, measure_variable_types
 from mutator.operators.interchangeable_variables import names_of_functions, replacements_of_name
 from mutator.operators.mutation_selection import select_mutations

@@ -13,7 +13,7 @@ from mutator.campaigns.plan import build_plan, load_plan
 from mutator.campaigns.plan_freezing import freeze_plan
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import Limits, MeasuredLimits
+from mutator.limits import Limits, MeasuredLimits
 from mutator.preflight.bench_checks import CheckedGolden
 from mutator.preflight.canary_check import CanaryVerdict, run_until_hazard
 from mutator.preflight.check_run_problems import CheckRun

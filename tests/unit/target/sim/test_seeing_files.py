@@ -20,7 +20,8 @@ from mutator._common import cache_layout_and_pruning
 from mutator.engines.engine_jobs import Job
 from mutator.engines.job_tree_pool import JobTreePool
 from mutator.engines.reference_engine import ReferenceEngine
-from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Status
+from mutator.limits import Limits
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Status
 from mutator.mutants.mutant_building import build
 from mutator.targets.source_tree import matches_any_glob
 from mutator.triggers.trigger_kinds import trigger_at_time

@@ -14,7 +14,7 @@ from mutator.execution.cluster.bundle import Bundle, load_run_inputs, unpack_bun
 from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.session_opening import open_session
-from mutator.model import MeasuredLimits
+from mutator.limits import MeasuredLimits
 from mutator.store.checks_file import CHECKS_FILE
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
