@@ -9,6 +9,8 @@ from mutator.model import Status
 from mutator.outcomes.hazard_and_metric_judgement import load_judged_run
 from mutator.store import plan_file
 from mutator.store.checks_file import CHECKS_FILE
+from mutator.store.golden_verdicts import load_golden_verdicts
+from mutator.store.planned_scenarios import planned_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 
@@ -26,6 +28,39 @@ def golden_hazard_problems(folder: RunFolder, manifest: TargetManifest) -> Itera
                 f"hazards {stored.get(golden_run.key, ())} of golden run {golden_run.key}",
                 where=folder.path / CHECKS_FILE,
                 expected=f"{hazards}, as in its trace",
+            )
+
+
+def golden_verdict_problems(folder: RunFolder, manifest: TargetManifest) -> Iterator[MutatorError]:
+    """Yield golden runs whose verdict in checks.json is missing, differs from the trace that is kept, or has
+    other hazards than `golden_hazards`.
+    """
+    path = folder.path / CHECKS_FILE
+    needs_verdicts = planned_scenarios_of(folder.path) is not None or not folder.head.experiments
+    if not path.is_file() or folder.is_bench or not needs_verdicts:
+        return
+    verdicts, runs_with_trace = load_golden_verdicts(folder), set(folder.kept_goldens)
+    keys = {golden_run.key for golden_run in folder.golden_runs}
+    if keys != verdicts.keys():
+        yield MutatorError(
+            f"{len(verdicts)} verdicts", where=path, expected=f"those of {len(keys)} golden runs"
+        )
+        return
+    for golden_run in folder.golden_runs:
+        verdict = verdicts[golden_run.key]
+        expected = {}
+        if golden_run in runs_with_trace:
+            trace, judged = load_judged_run(manifest, path_below(folder.path / "golden", golden_run.key))
+            duration_s = float(trace[manifest.time_channel][-1])
+            expected = {name: getattr(judged, name) for name in ("t_end", "hazards", "alerts", "metrics")}
+            expected["duration_s"] = duration_s
+        hazards = tuple(sorted(verdict.hazards, key=lambda hazard: (hazard[1], hazard[0])))
+        is_as_listed = folder.golden_hazards.get(golden_run.key, ()) == hazards
+        if not is_as_listed or any(getattr(verdict, name) != value for name, value in expected.items()):
+            yield MutatorError(
+                f"the verdict of golden run {golden_run.key}",
+                where=path,
+                expected="that of its trace, and the hazards in `golden_hazards`",
             )
 
 

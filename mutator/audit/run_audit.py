@@ -8,7 +8,11 @@ from pathlib import Path
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator._common.hashing import digest
-from mutator.audit.golden_hazard_audit import golden_hazard_problems, left_out_problems
+from mutator.audit.golden_hazard_audit import (
+    golden_hazard_problems,
+    golden_verdict_problems,
+    left_out_problems,
+)
 from mutator.audit.head_and_checks_audit import check_result_problems as checks_of
 from mutator.audit.head_and_checks_audit import (
     not_activated_run_problems,
@@ -80,7 +84,11 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
     )
     manifest = workspace.manifest(head.target) if workspace and not source_check.differences else None
     records, proven = load_stored_records(folder, "records"), load_stored_records(folder, "proof")
-    golden_hazards = golden_hazard_problems(folder, manifest) if manifest else ()
+    golden_hazards = (
+        chain(golden_hazard_problems(folder, manifest), golden_verdict_problems(folder, manifest))
+        if manifest
+        else ()
+    )
     idle = not_activated_run_problems(folder, manifest, records) if manifest else ()
     checks = [
         AuditCheck.from_problems(
@@ -150,7 +158,7 @@ def _content_problems(folder: RunFolder) -> Problems:
 
 def _golden_run_count(folder: RunFolder) -> int:
     try:
-        return len(folder.golden_runs)
+        return len(folder.kept_goldens)  # of the others, only verdicts are there
     except MutatorError:  # a damaged file, which another check reports
         return len(folder.head.goldens)
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 
+from mutator.campaigns.bench_files import load_campaign_of_run
+from mutator.campaigns.campaign_scenarios import CampaignScenarios
 from mutator.campaigns.plan import Plan
 from mutator.errors import MutatorError
 from mutator.store.file_digests import FileDigest
@@ -40,10 +42,14 @@ def planned_scenario_problems(folder: RunFolder, plan: Plan) -> Iterator[Mutator
 
 
 def family_problems(folder: RunFolder, workspace: Workspace) -> Iterator[MutatorError]:
-    """Yield a problem for each concrete scenario that its family does not give for its values."""
+    """Yield a problem for each concrete scenario that its family does not give for its values, and that the
+    campaign does not draw; without faults, also for each that it draws and the plan lacks.
+    """
     planned = planned_scenarios_of(folder.path)
     if planned is None:
         return
+    if not folder.is_bench:
+        yield from _draw_problems(folder, workspace, set(planned.by_name))
     families = {name: workspace.family(name) for name in planned.families}
     for name, stored in planned.by_name.items():
         scenario, family = stored.scenario, families[stored.scenario.family]
@@ -56,3 +62,16 @@ def family_problems(folder: RunFolder, workspace: Workspace) -> Iterator[Mutator
                 where=folder.path / SCENARIOS_FILE,
                 expected=f"what {family.path} gives for its values",
             )
+
+
+def _draw_problems(folder: RunFolder, workspace: Workspace, planned: set[str]) -> Iterator[MutatorError]:
+    campaign, head = load_campaign_of_run(folder), folder.head
+    scenarios = CampaignScenarios(workspace, campaign, workspace.manifest(head.target), head.seed)
+    drawn = {name for name in scenarios.names if scenarios.digest_and_concrete(name)[1] is not None}
+    missing = sorted(drawn - planned) if campaign.is_fault_free else []
+    for name in [*sorted(planned - drawn), *missing]:
+        yield MutatorError(
+            f"scenario {name}, which the campaign {'does not draw' if name in planned else 'draws'}",
+            where=folder.path / SCENARIOS_FILE,
+            expected=f"the {len(drawn)} scenarios that its families give with seed {head.seed}",
+        )

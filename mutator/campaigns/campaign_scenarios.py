@@ -1,5 +1,6 @@
 """The scenarios of a campaign: those that it names, and those that it draws from families."""
 
+from collections import Counter
 from functools import cached_property
 from pathlib import Path
 
@@ -45,6 +46,13 @@ class CampaignScenarios:
                 )
             self._digest_and_concrete_by_name |= {s.name: (s.digest, s) for s in drawn}
             names += [scenario.name for scenario in drawn]
+        if twice := [name for name, count in Counter(names).items() if count > 1]:
+            raise self._campaign.error(
+                ("scenarios",),
+                f"scenario {twice[0]} from the library and from a family",
+                expected="names that differ",
+                remedy="rename the scenario of the library",
+            )
         return tuple(names)
 
     @property

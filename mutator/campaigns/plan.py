@@ -181,6 +181,8 @@ class SeedBySeedPlan:
         if (expectation := self.campaign.expectation) is not None:
             scale, source = workspace.scale_of(self._manifest), self.campaign.yaml_source
             check_expectation(expectation, source, ("expect",), self._manifest.hazard_names, scale)
+        if self.campaign.is_fault_free:
+            _check_choices_without_faults(self.choices)
         if self.campaign.after_hazard is AfterHazard.STOP:
             stop_function_source(self._manifest)  # raises before any run starts
         self._expansion = CampaignExpansion(
@@ -290,6 +292,18 @@ class SeedBySeedPlan:
                 argument="shard",
                 expected=f"at most {chunk_count}, because the plan has that many chunks",
                 remedy="use fewer shards, or a smaller chunk in the campaign",
+            )
+
+
+def _check_choices_without_faults(choices: Choices) -> None:
+    """Raise MutatorError for a choice among experiments, of which a campaign without faults has none."""
+    for name in ("only", "exclude", "limit", "shard"):
+        if getattr(choices, name) is not None:
+            raise MutatorError(
+                str(getattr(choices, name)),
+                argument=name,
+                expected=f"no `{name}`: the campaign has no faults, and so no experiments to choose from",
+                remedy="choose scenarios in the campaign: `sample` of a family",
             )
 
 

@@ -327,28 +327,25 @@ class ForkEngine:
         golden_id = golden_run_id(job)
         if stored := self._observation_store.load(golden_id):
             return stored
-        folder = self._runs_folder / f"watch-{golden_id}"
-        try:
-            execution = self.drive_fault_free(job, folder)
-            if execution.status is not Status.OK:
-                raise NotForkable(f"its golden run ended as {execution.status.value}: {execution.detail}")
-            for name in self._manifest.output_files:
-                if read_bounded(execution.out / name) != read_bounded(golden / name):
-                    raise NotForkable(f"its {name} differs when it is driven step by step")
-            observations = observations_of_watched_run(execution)
-            if observations.has_any_before_first_step:
-                raise NotForkable("it observes before its first step")
-            self._observation_store.save(golden_id, observations)
-            return observations
-        finally:
-            remove_folder(folder)
+        execution = self.drive_fault_free(job)
+        if execution.status is not Status.OK:
+            raise NotForkable(f"its golden run ended as {execution.status.value}: {execution.detail}")
+        for name in self._manifest.output_files:
+            if read_bounded(execution.out / name) != read_bounded(golden / name):
+                raise NotForkable(f"its {name} differs when it is driven step by step")
+        observations = observations_of_watched_run(execution)
+        if observations.has_any_before_first_step:
+            raise NotForkable("it observes before its first step")
+        self._observation_store.save(golden_id, observations)
+        return observations
 
-    def drive_fault_free(self, job: Job, folder: Path) -> JobResult:
+    def drive_fault_free(self, job: Job) -> JobResult:
         """Drive a golden run in a fork of the loaded target, with a probe that observes it.
 
-        `folder` is a new scratch folder; the output is in that of the reference engine. NotForkable if the
-        target or this run cannot be forked.
+        The output is in the folder of the reference engine. NotForkable if the target or this run cannot be
+        forked.
         """
+        folder = self._runs_folder / f"watch-{golden_run_id(job)}"
         if self._obstacle:
             raise NotForkable(*self._obstacle.args)
         try:
@@ -359,7 +356,10 @@ class ForkEngine:
         self._process_before_step(job, 0, swap)  # NotForkable, with the reason, if the run cannot begin
         # Fork before the first step, because a later fork misses earlier observations.
         first = self._ensure_server(job).first_process
-        execution = self._run_in_fork(first, null, folder, swap, _BEFORE_FIRST_STEP, observe=True)
+        try:
+            execution = self._run_in_fork(first, null, folder, swap, _BEFORE_FIRST_STEP, observe=True)
+        finally:
+            remove_folder(folder)
         if execution.status is Status.HARNESS_ERROR:
             raise ForkServerLost(execution.detail)
         return execution

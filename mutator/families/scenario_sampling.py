@@ -16,6 +16,7 @@ from mutator.model import ConcreteScenario
 _Indices = tuple[int, ...]  # the index of each parameter's value
 _MOST_GRID_POINTS = 1_000_000  # beyond this, a grid is not searched for those that meet the constraints
 _MOST_DRAWS_PER_SCENARIO = 200  # so many draws may break the constraints, or be there already
+_MOST_EXPECTED_REPETITIONS = 0.1  # of the likeliest scenario, for draws to count as independent
 _ROUND = 1024  # points that are drawn at a time
 
 
@@ -40,6 +41,14 @@ def sample_scenarios(
     scenarios = tuple(family.concrete(_values_at(family, indices)) for indices in chosen)
     _check_names_differ(family, scenarios)
     return scenarios
+
+
+def has_independent_draws(family: Family, count: int, method: str) -> bool:
+    """Whether so many scenarios are drawn nearly as often as their probabilities say. As no scenario is drawn
+    twice, likely ones are soon all there; values that are equally likely stay so.
+    """
+    shares = [max(p.probabilities) for p in family.parameters if p.probabilities is not None]
+    return method == "grid" or not shares or count * math.prod(shares) <= _MOST_EXPECTED_REPETITIONS
 
 
 def frequency_weight(family: Family, values: Mapping[str, ParameterValue], method: str) -> float:

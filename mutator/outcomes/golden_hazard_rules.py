@@ -76,14 +76,17 @@ def compare_with_golden(
     moved_s = {name: time - golden_times[name] for name, time in faulty.times if name in golden_times}
     earlier = [name for name, by_s in moved_s.items() if by_s < -most_s]
     added, case = {*another, *earlier}, AgainstGolden.SAME
+    is_worse = faulty.classified is not None and faulty.severity > golden.severity
     if added:
         case = AgainstGolden.ANOTHER if another else AgainstGolden.EARLIER
-    elif faulty.classified and faulty.severity > golden.severity:
-        added, case = {faulty.classified.hazard}, AgainstGolden.WORSE
+    elif is_worse:
+        case = AgainstGolden.WORSE
     elif moved_s.keys() != golden_times.keys():
         case = AgainstGolden.MISSING
     elif any(by_s > most_s for by_s in moved_s.values()):
         case = AgainstGolden.LATER
+    if is_worse and faulty.classified:  # also one of golden, beside another or an earlier one
+        added.add(faulty.classified.hazard)
     return HazardComparison(
         case=case,
         hazards=tuple(event for event in faulty.times if event[0] in added),

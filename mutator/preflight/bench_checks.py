@@ -328,7 +328,8 @@ class BenchChecks:
         digests = {output_digest_of(self.manifest, copy / "golden"), golden.output_digest}
         if self.passed_goldens.get(path) != golden:
             again = replace(self._runner([golden_run], None), pending_folder=self.scratch_folder / "again")
-            digests.update(again.repeat_goldens(1, self.notify).values())
+            repeated = again.repeat_goldens(1, self.notify)
+            digests.update(run.output_digest for run in repeated.values())
         if digests != {golden.output_digest}:
             return False  # forged, or no longer true
         self._move_to_pending(copy / "golden", golden_run)

@@ -14,6 +14,7 @@ from mutator._common.confined_files import path_below
 from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import Job, JobResult
 from mutator.engines.fork_engine import ForkEngine
+from mutator.errors import ForkServerLost, NotForkable
 from mutator.limits import Limits
 from mutator.mutants.mutant_building import Mutant
 from mutator.store.golden_runs import GoldenRun
@@ -63,12 +64,18 @@ class ForkedGoldenRuns:
     def drive(self, job: Job) -> tuple[ForkEngine, JobResult]:
         """Drive a golden run; return the engine, whose folder has the output, and the result.
 
-        NotForkable and ForkServerLost as `ForkEngine.drive_fault_free` raises them.
+        NotForkable if this cannot be done, also if a server has been lost twice.
         """
         engine = self._engine_of_thread()
-        return engine, engine.drive_fault_free(
-            job, path_below(engine.reference.work_folder, f"golden-{job.name}")
-        )
+        try:
+            return engine, engine.drive_fault_free(job)
+        except ForkServerLost:
+            engine.close()
+        try:
+            return engine, engine.drive_fault_free(job)
+        except ForkServerLost as why:
+            engine.close()
+            raise NotForkable(str(why)) from None
 
     def close(self) -> None:
         """End the servers."""

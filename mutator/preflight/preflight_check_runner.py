@@ -22,7 +22,7 @@ from mutator.engines.golden_run_keys import golden_run_id
 from mutator.engines.observation_store import ObservationStore, observations_of_watched_run
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import measure_limits
-from mutator.errors import ForkServerLost, NotForkable
+from mutator.errors import NotForkable
 from mutator.limits import Limits
 from mutator.model import Experiment, Status
 from mutator.mutants.mutant_building import Mutant, build
@@ -83,8 +83,8 @@ class CheckRunner:
                 runs |= self.repetitions(engine, key, runs)
             return runs, judged.result()
 
-    def repeat_goldens(self, workers: int, notify: OnProgress) -> dict[str, str]:
-        """Do each golden run once, as null mutant; return the digests of what they write, by key."""
+    def repeat_goldens(self, workers: int, notify: OnProgress) -> dict[str, CheckRun]:
+        """Do each golden run once, as null mutant; return the runs by key."""
         jobs = {
             name: job
             for name, job in self.jobs_by_name().items()
@@ -95,7 +95,7 @@ class CheckRunner:
                 name[1].key: pool.submit(self.run_job, engine, name, job) for name, job in jobs.items()
             }
             _report_progress("golden", [*futures.values()], notify)
-            return {key: future.result().output_digest for key, future in futures.items()}
+            return {key: future.result() for key, future in futures.items()}
 
     def repetitions(self, engine: ReferenceEngine, key: GoldenRun, runs: CheckRunByName) -> CheckRunByName:
         """Return the runs that stand for the repeated golden run and the null mutant: the one that there is
@@ -245,7 +245,7 @@ class CheckRunner:
 
     def run_job(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
         if name[0] == FORKED:
-            return self._run_forked(name[1], job)
+            return self._run_forked(engine, name[1], job)
         scratch = path_below(engine.work_folder, job.name)
         try:
             execution = engine.execute(job, scratch)
@@ -262,12 +262,15 @@ class CheckRunner:
         finally:
             remove_folder(scratch)
 
-    def _run_forked(self, key: GoldenRun, job: Job) -> CheckRun:
+    def _run_forked(self, engine: ReferenceEngine, key: GoldenRun, job: Job) -> CheckRun:
+        """Drive a golden run in a fork or, if it cannot be forked, as null mutant on the reference engine."""
         assert self.forked_golden_runs
         try:
             forks, execution = self.forked_golden_runs.drive(job)
-        except (NotForkable, ForkServerLost) as why:
-            return CheckRun(problem=f"cannot be forked: {why}")
+            scratch = forks.reference.folder_of_job(job)
+        except NotForkable:
+            scratch = path_below(engine.work_folder, job.name)
+            execution = engine.execute(job, scratch)
         try:
             run = read_check_run(self.manifest, execution)
             if key in self.driven_once and key not in self.dropped:
@@ -278,7 +281,7 @@ class CheckRunner:
                     execution.out.rename(golden_folder)
             return run
         finally:
-            remove_folder(forks.reference.folder_of_job(job))
+            remove_folder(scratch)
 
     def _keep_observations(self, key: GoldenRun, job: Job, execution: JobResult) -> None:
         unreached_triggers.save_observations(

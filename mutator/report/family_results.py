@@ -9,7 +9,7 @@ from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.errors import MutatorError
 from mutator.families.family import Family
 from mutator.families.family_facts import FamilyFacts
-from mutator.families.scenario_sampling import frequency_weight
+from mutator.families.scenario_sampling import frequency_weight, has_independent_draws
 from mutator.model import ConcreteScenario
 from mutator.report.reported_run import ReportedRun
 from mutator.statistics.family_statistics import FamilyShare, family_shares, scenarios_frame
@@ -78,7 +78,8 @@ def _weights(
     folder: RunFolder, family: Family | None, scenarios: list[ConcreteScenario]
 ) -> np.ndarray | None:
     """Return the weight of each scenario: how often it occurs, relative to how often it is drawn. None
-    without a `frequency`, and in a bench, whose scenarios are not drawn.
+    without a `frequency`, in a bench, whose scenarios are not drawn, and if so many were drawn that likely
+    ones are exhausted.
     """
     if family is None or family.frequency is None or folder.is_bench:
         return None
@@ -86,6 +87,7 @@ def _weights(
     method = next(
         (s.sampling for s in selections if not isinstance(s, str) and s.family == family.name), None
     )
-    return np.array(
-        [frequency_weight(family, scenario.values, method or family.sampling) for scenario in scenarios]
-    )
+    method = method or family.sampling
+    if not has_independent_draws(family, len(scenarios), method):
+        return None
+    return np.array([frequency_weight(family, scenario.values, method) for scenario in scenarios])

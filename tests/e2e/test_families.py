@@ -1,6 +1,8 @@
 """Campaigns, benches and trials in scenarios that families give, driven on the toy car."""
 
+import dataclasses
 import json
+import shutil
 from pathlib import Path
 
 import pandas as pd
@@ -8,7 +10,8 @@ import pytest
 
 import mutator
 from mutator._common.files import json_bytes
-from mutator.campaigns.plan import build_plan
+from mutator.campaigns.plan import build_plan, load_plan
+from mutator.campaigns.plan_tally import plan_digest
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
@@ -185,10 +188,7 @@ def test_seeds_share_the_scenarios_of_the_first(families: Workspace) -> None:
 
 
 def test_a_campaign_without_faults_drives_its_scenarios(families: Workspace, tmp_path: Path) -> None:
-    campaign = families.library / "campaigns" / "toy.yaml"
-    head, _, rest = campaign.read_text().partition("faults:")
-    canary = next(line for line in rest.splitlines() if line.startswith("canary"))
-    campaign.write_text(f"{head.replace('sample: 3', 'sample: 24')}faults: []\nseed: 7\n{canary}\n")
+    without_faults(families, 24)
     out = tmp_path / "run"
     assert run_campaign(families, "toy", out, engine="fork").exit_code == 0
     run = mutator.load_run(out, workspace=families)
@@ -222,6 +222,84 @@ def test_a_fork_that_differs_stops_the_family(
     car.write_text(car.read_text().replace(moved, f"{moved} + 1e-9 * (os.getpid() != _LOADED_BY)"))
     with pytest.raises(CheckFailed, match="a fork of the loaded target gives other bytes"):
         run_campaign(families, "toy", tmp_path / "run", engine="fork")
+
+
+def test_forged_results_of_drives_are_found(families: Workspace, tmp_path: Path) -> None:
+    without_faults(families, 24)
+    run = tmp_path / "run"
+    run_campaign(families, "toy", run, engine="fork")
+    whole = {
+        path: path.read_bytes() for path in (run / "checks.json", run / SCENARIOS_FILE, run / "run.json")
+    }
+    checks = json.loads((run / "checks.json").read_text())
+    checks["verdicts"]["A"]["duration_s"] = 360_000.0  # its trace is kept
+    (run / "checks.json").write_bytes(json_bytes(checks))
+    forge_digests(run)
+    assert mutator.verify(run, workspace=families).differences
+    for path, data in whole.items():
+        path.write_bytes(data)
+    lines = (run / SCENARIOS_FILE).read_text().splitlines(keepends=True)
+    (run / SCENARIOS_FILE).write_text("".join(lines[:10]))  # as if it had never been drawn
+    checks = json.loads((run / "checks.json").read_text())
+    names = ["A", *(json.loads(line)["name"] for line in lines[:10])]
+    for key in ("goldens", "verdicts"):
+        checks[key] = {name: checks[key][name] for name in names}
+    (run / "checks.json").write_bytes(json_bytes(checks))
+    head = json.loads((run / "run.json").read_text())
+    head["scenarios"] = FileDigest.of_file(run / SCENARIOS_FILE).sha256
+    (run / "run.json").write_bytes(json_bytes(head))
+    head["plan"] = plan_digest_of_drives(run)
+    (run / "run.json").write_bytes(json_bytes(head))
+    forge_digests(run)
+    found = " ".join(map(str, mutator.verify(run, workspace=families).differences))
+    assert "which the campaign draws" in found
+
+
+def plan_digest_of_drives(run: Path) -> str:
+    plan = load_plan(RunFolder(run))
+    return plan_digest([], (), plan.canary.id if plan.canary else "", plan.campaign, plan.drives)
+
+
+def without_faults(families: Workspace, count: int) -> None:
+    campaign = families.library / "campaigns" / "toy.yaml"
+    head, _, rest = campaign.read_text().partition("faults:")
+    canary = next(line for line in rest.splitlines() if line.startswith("canary"))
+    text = head.replace("sample: 3", f"sample: {count}")
+    campaign.write_text(f"{text}faults: []\nseed: 7\n{canary}\n")
+
+
+def test_choices_among_experiments_are_refused_without_faults(families: Workspace) -> None:
+    without_faults(families, 5)
+    for choices in (Choices(only="value > 1"), Choices(limit=3), Choices(shard="1/2")):
+        with pytest.raises(MutatorError, match="the campaign has no faults"):
+            build_plan(families, "toy", choices)
+
+
+def test_a_library_scenario_with_the_name_of_a_drawn_one_is_refused(families: Workspace) -> None:
+    drawn = next(e.scenario for e in build_plan(families, "toy").experiments if e.concrete)
+    scenarios = families.library / "scenarios"
+    (scenarios / f"{drawn}.yaml").write_bytes((scenarios / "B.yaml").read_bytes())
+    campaign = families.library / "campaigns" / "toy.yaml"
+    campaign.write_text(campaign.read_text().replace("[A,", f"[A, {drawn},"))
+    with pytest.raises(MutatorError, match="from the library and from a family"):
+        build_plan(families, "toy")
+
+
+def test_a_target_that_cannot_be_forked_is_driven_on_the_reference_engine(
+    families: Workspace, tmp_path: Path
+) -> None:
+    without_faults(families, 24)
+    world = families.manifest("toycar").root / "toycar" / "world.py"
+    wait = "threading.Thread(target=threading.Event().wait, daemon=True).start()"
+    world.write_text(f"import threading\n{wait}\n{world.read_text()}")
+    assert run_campaign(families, "toy", tmp_path / "run", engine="fork").exit_code == 0
+
+
+@pytest.mark.skipif(shutil.which("bwrap") is None, reason="needs bubblewrap")
+def test_families_run_in_a_sandbox(families: Workspace, tmp_path: Path) -> None:
+    without_faults(families, 24)
+    sandboxed = dataclasses.replace(families, sandbox=True)
+    assert run_campaign(sandboxed, "toy", tmp_path / "run", engine="fork").exit_code == 0
 
 
 @pytest.mark.parametrize(

@@ -21,8 +21,8 @@ from mutator.web import packed_script_element
 
 _INTRODUCTION = (
     "Shares of the experiments in a family's concrete scenarios. Experiments of one scenario are alike, so "
-    "the 95 % intervals resample whole scenarios (bootstrap); there is none if all scenarios have the same "
-    "share."
+    "the 95 % intervals resample whole scenarios (bootstrap); there is none below ten scenarios, or "
+    "if all have the same share."
 )
 _WEIGHTED_NOTE = (
     "The weighted share is that of experiments in scenarios as often as they occur on the road: each counts "

@@ -4,8 +4,7 @@
 
 class Experiment {
   static ENDINGS = { // why an experiment has no channels, by its status
-    crashed: "The run crashed", timeout: "The run did not end in time", invalid_mutant: "The mutant could not be built", harness_error: "The harness failed",
-    left_out: "The experiment was left out",
+    crashed: "The run crashed", timeout: "The run did not end in time", invalid_mutant: "The mutant could not be built", harness_error: "The harness failed", left_out: "The experiment was left out",
   };
 
   static open = null; // {id, experiment} for scripts that add buttons; the event `filled` notifies them
@@ -136,20 +135,13 @@ class Experiment {
     return Dom.el("span", { title: this.table.meaning("scenario", this.text("scenario")) }, Dom.bound(this.table.scenario(this.row)));
   }
 
-  /** The scenario as commands name it: `S1`, or `follow:ego_kph=60,gap_m=20`. */
-  scenarioArgument() {
-    const name = this.text("scenario"), family = this.table.families.find((each) => each.name === name);
-    if (!family || this.text("family") !== name) return name;
-    return `${name}:${family.parameters.map(({ key }) => `${key}=${this.text(key)}`).join(",")}`;
-  }
-
   /** The `mutator try` command for this fault. A random trigger becomes a time. The reading is always named, because
    *  the default depends on the library. */
   tryCommand() {
     const value = this.text("value"), isNumber = value !== "" && !Number.isNaN(Number(value));
     const quoted = (text) => (/^[\w./:=,-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
     const when = /^\w+$/.test(this.text("trigger")) ? this.text("trigger") : this.text("condition").replace(/^t >= ([\d.]+)$/, "$1");
-    const parts = ["mutator try", quoted(this.text("kind")), "--scenario", quoted(this.scenarioArgument())];
+    const parts = ["mutator try", quoted(this.text("kind")), "--scenario", quoted(this.table.scenarioArgument(this.row))];
     if (this.text("variant")) parts.push("--variant", quoted(this.text("variant")));
     if (isNumber) parts.push("--value", value);
     if (when) parts.push("--trigger", quoted(when));

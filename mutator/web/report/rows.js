@@ -85,6 +85,13 @@ const Rows = (() => {
       return [name, ...family.parameters.map((parameter) => this.parameter(row, parameter))].join(", ");
     }
 
+    /** The scenario of a row as commands name it: `S1`, or `follow:ego_kph=60,gap_m=20`. */
+    scenarioArgument(row) {
+      const name = this.text(row, "scenario"), family = this.families.find((each) => each.name === name);
+      if (!family || this.text(row, "family") !== name) return name;
+      return `${name}:${family.parameters.map(({ key }) => `${key}=${this.text(row, key)}`).join(",")}`;
+    }
+
     /** A parameter's value in a row, with name and unit: `ego 60 km/h`. */
     parameter(row, { key, name, unit }) {
       const value = this.number(row, key);

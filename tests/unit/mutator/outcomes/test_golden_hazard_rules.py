@@ -52,6 +52,8 @@ def test_the_case_and_the_outcome_follow_the_truth_table(cell: tuple[str, str, b
     counts = case in (AgainstGolden.ANOTHER, AgainstGolden.EARLIER, AgainstGolden.WORSE)
     assert bool(compared.hazards) is counts
     assert sorted((*compared.hazards, *compared.golden_hazards)) == sorted(events)
+    if worse and worst:  # a worse hazard counts, also beside another or an earlier one
+        assert worst.hazard in dict(compared.hazards)
     outcome = outcome_of(
         activation=BEFORE,
         t_manifest=3.0 if manifested else None,

@@ -8,6 +8,7 @@ import pytest
 
 from mutator.families.family_facts import FamilyFacts, ParameterFacts
 from mutator.model import ConcreteScenario
+from mutator.statistics import family_statistics
 from mutator.statistics.family_statistics import families_sheet, family_shares, scenarios_frame
 from mutator.statistics.fault_free_drive_tables import JudgedDrive
 from mutator.store.golden_runs import GoldenRun
@@ -65,6 +66,17 @@ def shares_of(counts: list[tuple[int, int]], weights: np.ndarray | None = None) 
     return {share.what: share for share in family_shares(frame, ["NEAR"], weights)}
 
 
+@pytest.fixture
+def four_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(family_statistics, "_LEAST_SCENARIOS", 4)
+
+
+def test_there_is_no_interval_for_few_scenarios() -> None:
+    """The bootstrap of a handful of scenarios covers too little."""
+    assert math.isnan(shares_of([(1, 1), (0, 1), (0, 1), (0, 1)])["hazard"].share.low)
+
+
+@pytest.mark.usefixtures("four_are_enough")
 def test_the_interval_is_that_of_scenarios_not_of_experiments() -> None:
     """A hundred like experiments of a scenario say no more than one of them."""
     few = shares_of([(1, 1), (0, 1), (0, 1), (0, 1)])["hazard"].share
@@ -74,12 +86,14 @@ def test_the_interval_is_that_of_scenarios_not_of_experiments() -> None:
     assert few.high == pytest.approx(0.75)
 
 
+@pytest.mark.usefixtures("four_are_enough")
 def test_there_is_no_interval_if_all_scenarios_agree() -> None:
     share = shares_of([(1, 2)] * 4)["hazard"].share
     assert share.rate == 0.5
     assert math.isnan(share.low)
 
 
+@pytest.mark.usefixtures("four_are_enough")
 def test_a_weight_counts_a_scenario_that_often() -> None:
     weights = np.array([3.0, 1.0, 1.0, 1.0])
     weighted = shares_of([(2, 2), (0, 2), (0, 2), (0, 2)], weights)["hazard"].weighted
