@@ -234,6 +234,11 @@ class ConcreteScenario:
         """The name: the family, and the first 12 digits of the digest."""
         return f"{self.family}-{self.digest[:12]}"
 
+    @property
+    def label_with_family(self) -> str:
+        """The family and the values as text: `follow, ego 60 km/h, gap 20 m`."""
+        return f"{self.family}, {self.label}"
+
 
 @dataclass(frozen=True)
 class Experiment:
@@ -281,7 +286,7 @@ class Experiment:
     @property
     def scenario_label(self) -> str:
         """The label of the scenario: `S1`, or family and values, `follow, ego 60 km/h, gap 20 m`."""
-        return f"{self.concrete.family}, {self.concrete.label}" if self.concrete else self.scenario
+        return self.concrete.label_with_family if self.concrete else self.scenario
 
     @property
     def family_or_scenario(self) -> str:

@@ -47,7 +47,7 @@ from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import run_deletion
 from mutator.store.golden_runs import GoldenRun
-from mutator.store.planned_scenarios import planned_scenarios_of
+from mutator.store.planned_scenarios import concrete_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
 from mutator.targets.overhead_view_json import scene_as_json
@@ -172,8 +172,7 @@ class Run(RunFigures):
         experiments with a valid result: `experiments`, by outcome, `failed` (crashed or timed out), and by
         hazard.
         """
-        planned = planned_scenarios_of(self.path)
-        scenarios = [each.scenario for each in planned.by_name.values()] if planned else []
+        scenarios = concrete_scenarios_of(self.path).values()
         usable = prepare_results(self._results_frame)
         drives = load_judged_drives(self.folder)
         return scenarios_frame(self.folder.head.families, scenarios, usable, drives)

@@ -141,8 +141,8 @@ def try_fault(
     """Inject one fault and run the scenario twice, once without the fault.
 
     `fault` and `trigger` are as for `build_mutant`; contexts, `always` and conditions are armed after
-    `armed_after_s` (s; default: the manifest's). `scenario` is a name, a file, or a
-    family with values: `r157_deceleration:ego=60,gap=20`. Output goes to a new folder
+    `armed_after_s` (s; default: the manifest's). `scenario` is a name, a file, or a family
+    with values: `r157_deceleration:ego=60,gap=20`. Output goes to a new folder
     in `out`; default: a temporary folder, deleted with the Trial.
 
     MutatorError for a mistake in the arguments, CheckFailed if the golden run fails. A crash of the

@@ -20,7 +20,7 @@ def golden_hazard_problems(folder: RunFolder, manifest: TargetManifest) -> Itera
     if not (folder.path / CHECKS_FILE).is_file():
         return
     stored = folder.golden_hazards
-    for golden_run in folder.kept_goldens:
+    for golden_run in folder.goldens_with_files:
         _, judged = load_judged_run(manifest, path_below(folder.path / "golden", golden_run.key))
         hazards = tuple(sorted(judged.hazards, key=lambda hazard: (hazard[1], hazard[0])))
         if stored.get(golden_run.key, ()) != hazards:
@@ -39,7 +39,7 @@ def golden_verdict_problems(folder: RunFolder, manifest: TargetManifest) -> Iter
     needs_verdicts = planned_scenarios_of(folder.path) is not None or not folder.head.experiments
     if not path.is_file() or folder.is_bench or not needs_verdicts:
         return
-    verdicts, runs_with_trace = load_golden_verdicts(folder), set(folder.kept_goldens)
+    verdicts, runs_with_trace = load_golden_verdicts(folder), set(folder.goldens_with_files)
     keys = {golden_run.key for golden_run in folder.golden_runs}
     if keys != verdicts.keys():
         yield MutatorError(

@@ -158,7 +158,7 @@ def _content_problems(folder: RunFolder) -> Problems:
 
 def _golden_run_count(folder: RunFolder) -> int:
     try:
-        return len(folder.kept_goldens)  # of the others, only verdicts are there
+        return len(folder.goldens_with_files)  # of the others, only verdicts are there
     except MutatorError:  # a damaged file, which another check reports
         return len(folder.head.goldens)
 

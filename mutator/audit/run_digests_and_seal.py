@@ -138,7 +138,7 @@ def unsealed_facts(folder: RunFolder) -> dict[str, str]:
 def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
     """Digest of each golden run's files `names` (trace and record)."""
     digests = {}
-    for golden_run in folder.kept_goldens:
+    for golden_run in folder.goldens_with_files:
         golden_folder = folder.golden_folder(*golden_run)
         files = [digest(read_bounded(path_below(golden_folder, name))) for name in names]
         digests[golden_run.key] = digest(files)

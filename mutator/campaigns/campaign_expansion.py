@@ -12,9 +12,9 @@ from mutator._common.message_text import describe_choices
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_scenarios import CampaignScenarios
 from mutator.campaigns.campaign_triggers import build_listed_triggers
+from mutator.campaigns.fault_free_drives import FaultFreeDrive
 from mutator.campaigns.operator_faults import OperatorFault, OperatorFaultFinder
 from mutator.campaigns.operator_selection import MutantActivity
-from mutator.campaigns.plan_tally import FaultFreeDrive
 from mutator.campaigns.sampling import evenly_spread_indices
 from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError

@@ -16,14 +16,9 @@ from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, check_expectation, check_readings, load_campaign
 from mutator.campaigns.chunks import chunk_lengths_of_runs
+from mutator.campaigns.fault_free_drives import FaultFreeDrive, check_choices_without_faults, drives_of_run
 from mutator.campaigns.neutral_faults import NeutralFaultWarner
-from mutator.campaigns.plan_tally import (
-    FaultFreeDrive,
-    FaultTypeAndMethod,
-    PlanPart,
-    PlanTally,
-    plan_digest,
-)
+from mutator.campaigns.plan_tally import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
 from mutator.campaigns.row_filters import matching_items
 from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_in_proportion
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
@@ -35,7 +30,6 @@ from mutator.results.plan_columns import columns_of_plan, plan_column_names, pla
 from mutator.store import plan_file
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_choices import Choices
-from mutator.store.planned_scenarios import planned_scenarios_of
 from mutator.store.preflight_results import mean_golden_run_cpu_s
 from mutator.store.run_folder import RunFolder
 from mutator.store.shards import Shard
@@ -182,7 +176,7 @@ class SeedBySeedPlan:
             scale, source = workspace.scale_of(self._manifest), self.campaign.yaml_source
             check_expectation(expectation, source, ("expect",), self._manifest.hazard_names, scale)
         if self.campaign.is_fault_free:
-            _check_choices_without_faults(self.choices)
+            check_choices_without_faults(self.choices)
         if self.campaign.after_hazard is AfterHazard.STOP:
             stop_function_source(self._manifest)  # raises before any run starts
         self._expansion = CampaignExpansion(
@@ -295,18 +289,6 @@ class SeedBySeedPlan:
             )
 
 
-def _check_choices_without_faults(choices: Choices) -> None:
-    """Raise MutatorError for a choice among experiments, of which a campaign without faults has none."""
-    for name in ("only", "exclude", "limit", "shard"):
-        if getattr(choices, name) is not None:
-            raise MutatorError(
-                str(getattr(choices, name)),
-                argument=name,
-                expected=f"no `{name}`: the campaign has no faults, and so no experiments to choose from",
-                remedy="choose scenarios in the campaign: `sample` of a family",
-            )
-
-
 def _selected_seeds(campaign: Campaign, choices: Choices) -> range:
     return campaign.seeds if choices.seed is None else range(choices.seed, choices.seed + 1)
 
@@ -378,28 +360,9 @@ def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
         run_cpu_s=mean_golden_run_cpu_s(folder),
         cpu_limit_s=limits.cpu_s if is_limit_known else None,
         operator_notes=head.operators,
-        drives=_drives_of_run(folder) if campaign.is_fault_free else (),
+        drives=drives_of_run(folder) if campaign.is_fault_free else (),
         families=head.families,
     )
     if tally is not None:
         vars(plan)["tally"] = tally  # set the cached property; computing it would read every experiment
     return plan
-
-
-def _drives_of_run(folder: RunFolder) -> tuple[FaultFreeDrive, ...]:
-    """Return the drives of a campaign without faults. A canary's golden run is the last that run.json lists,
-    and is one only if the campaign names its scenario.
-    """
-    planned, campaign = planned_scenarios_of(folder.path), load_campaign_of_run(folder)
-    by_name = planned.by_name if planned else {}
-    runs = [run for run in folder.golden_runs if run.scenario in {*campaign.scenarios, *by_name}]
-    return tuple(
-        FaultFreeDrive(
-            golden_run=run,
-            scenario_digest=by_name[run.scenario].scenario.digest
-            if run.scenario in by_name
-            else folder.head.sources[f"scenario {run.scenario}"],
-            concrete=by_name[run.scenario].scenario if run.scenario in by_name else None,
-        )
-        for run in runs
-    )

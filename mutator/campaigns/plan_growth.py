@@ -44,8 +44,8 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.stored_phrases import Phrases
 from mutator.workspace import Workspace
 
-_FILES_OF_BATCH = (EXPERIMENTS_FILE, FAULTS_FILE, PLAN_CSV, BATCHES_FILE)
-APPENDED_FILES = (*_FILES_OF_BATCH, SCENARIOS_FILE)  # the last one only if a family gave a scenario
+# the last one only if a family gave a scenario
+APPENDED_FILES = (EXPERIMENTS_FILE, FAULTS_FILE, PLAN_CSV, BATCHES_FILE, SCENARIOS_FILE)
 
 
 @dataclass(slots=True)

@@ -7,6 +7,7 @@ from hashlib import sha256
 
 from mutator._common.hashing import as_json_types, canonical_json
 from mutator.campaigns.campaign_files import Campaign
+from mutator.campaigns.fault_free_drives import FaultFreeDrive
 from mutator.model import ConcreteScenario, Experiment, Fault
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.planned_scenarios import PlannedScenario
@@ -26,15 +27,6 @@ class PlanPart:
     experiments: Sequence[Experiment]
     chunk_lengths: Sequence[int]
     run_count: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FaultFreeDrive:
-    """A golden run that a campaign without faults drives; `concrete` is its scenario, if a family gave it."""
-
-    golden_run: GoldenRun
-    scenario_digest: str
-    concrete: ConcreteScenario | None
 
 
 @dataclass(slots=True, kw_only=True)

@@ -18,7 +18,7 @@ from mutator._common.files import ScratchFolder
 from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.checks import fast_engine_check, nondeterminism_suspects
-from mutator.checks.check_findings import CheckState, Finding
+from mutator.checks.check_findings import CheckState, Finding, golden_hazard_finding
 from mutator.checks.first_run_difference import describe_first_difference
 from mutator.checks.reached_statements_and_triggers import ReachTracker
 from mutator.checks.unloaded_files import unloaded_files_findings
@@ -29,10 +29,9 @@ from mutator.engines.in_target.nondeterminism_watch import CLOCK, THREAD
 from mutator.engines.reach_jobs import watched_job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.run_limits import limits_before_measuring, measure_limits
-from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import NotForkable
 from mutator.limits import Limits
-from mutator.model import Experiment, GoldenClass
+from mutator.model import Experiment
 from mutator.mutants.injected_line_syntax import target_line_of
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe_contract import is_probe_path
@@ -43,7 +42,6 @@ from mutator.preflight.check_run_problems import (
     null_mutant_problem,
     read_check_run,
 )
-from mutator.store.checks_file import HazardTimes, describe_golden_hazards
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
@@ -197,7 +195,7 @@ class _RunningCheck:
         if not problem and not (problem := null_mutant_problem(first, watched)):
             success = f"the same bytes twice, in {golden.first.cpu_s:.1f} s of CPU each"
             if first.hazards:
-                return _golden_hazard_finding(name, success, first.hazards)
+                return golden_hazard_finding(name, success, first.hazards)
             return Finding(name=name, level=CheckState.OK, found=success)
         if first.problem or again.problem or watched.problem or first.output_digest == again.output_digest:
             remedy = "fix the target, the scenario or the manifest: no campaign can start"
@@ -271,7 +269,7 @@ class _RunningCheck:
             refusal = (
                 self._forking_refusal(scenario, golden)
                 if is_tried
-                else _forking_refusal_by_threads(golden.watched_counting)
+                else fast_engine_check.forking_refusal_by_threads(golden.watched_counting)
             )
         if refusal is None and not is_tried:
             why = (
@@ -385,21 +383,6 @@ class _RunningCheck:
             found=f"{experiment.fault.spec} in {experiment.scenario} {verdict.problem or verdict.success}",
             remedy=verdict.remedy,
         )
-
-
-def _golden_hazard_finding(name: str, success: str, hazards: HazardTimes) -> Finding:
-    kind = GoldenClass.HAZARD_WITHOUT_FAULT
-    return Finding(
-        name=name,
-        level=CheckState.WARN,
-        found=f"{success}; {kind}: {describe_golden_hazards(hazards)}",
-        remedy=f"campaigns leave its experiments out, unless they `include: {kind}`",
-    )
-
-
-def _forking_refusal_by_threads(execution: JobResult) -> NotForkable | None:
-    threads = execution.watch_report.get("threads", [])
-    return NotForkable(describe_too_many_threads(threads), remedy_for_threads(threads)) if threads else None
 
 
 def _reading_of(workspace: Workspace, campaign: Campaign) -> str:

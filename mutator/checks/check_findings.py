@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from mutator.model import GoldenClass
+from mutator.store.checks_file import HazardTimes, describe_golden_hazards
+
 
 class CheckState(StrEnum):
     """The effect of a finding on campaigns."""
@@ -34,3 +37,14 @@ class Finding:
     found: str
     remedy: str = ""
     places: tuple[FindingPlace, ...] = ()
+
+
+def golden_hazard_finding(name: str, success: str, hazards: HazardTimes) -> Finding:
+    """Return the warning of a golden run that is sound (`success` says how), but has these hazards."""
+    kind = GoldenClass.HAZARD_WITHOUT_FAULT
+    return Finding(
+        name=name,
+        level=CheckState.WARN,
+        found=f"{success}; {kind}: {describe_golden_hazards(hazards)}",
+        remedy=f"campaigns leave its experiments out, unless they `include: {kind}`",
+    )

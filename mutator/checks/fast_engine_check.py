@@ -5,7 +5,9 @@ from dataclasses import replace
 from mutator._common.files import ScratchFolder
 from mutator._common.message_text import counted
 from mutator.checks.check_findings import CheckState, Finding
+from mutator.engines.engine_jobs import JobResult
 from mutator.engines.forkable import find_obstacle_by_loading, reasons_by_unforkable_variant
+from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import MutatorError, NotForkable
 from mutator.faults.spec_expansion import expand_spec
 from mutator.targets.manifest import TargetManifest
@@ -64,3 +66,9 @@ def unloadable_variants_finding(workspace: Workspace, manifest: TargetManifest) 
         found=f"{unforkable_count} of {counted(count, 'variant')} cannot be forked: {listed_reasons}",
         remedy=_FALLBACK_NOTE,
     )
+
+
+def forking_refusal_by_threads(execution: JobResult) -> NotForkable | None:
+    """Return why a run cannot be forked that has started threads; None if it has started none."""
+    threads = execution.watch_report.get("threads", [])
+    return NotForkable(describe_too_many_threads(threads), remedy_for_threads(threads)) if threads else None

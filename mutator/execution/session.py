@@ -318,9 +318,7 @@ class Session:
             is_provisional=is_provisional,
             left_out=left_out,
             since_note=since_note,
-            golden_hazards_note=left_out_note_of_records(
-                records, outcomes, self.folder.planned_experiment_count
-            ),
+            golden_hazards_note=left_out_note_of_records(self.folder, records, outcomes),
         )
 
     def _make_proving_worker(self) -> Worker:
@@ -373,7 +371,7 @@ class Session:
             elapsed_s=time.monotonic() - self._start_s,
             has_reached_nothing=self._has_reached_nothing(outcome.outcomes),
             golden_hazards_note=left_out_note_of_records(
-                self.folder.records(), outcome.outcomes, self.folder.planned_experiment_count
+                self.folder, self.folder.records(), outcome.outcomes
             ),
         )
 

@@ -32,9 +32,8 @@ LabelledLimits = Sequence[tuple[float, str]]
 def draw_values(
     points: pd.DataFrame, *, title: str, x_label: str, y_label: str, limits: LabelledLimits
 ) -> "Figure":
-    """Draw a mark for each row of `points`: `value` and `y`, with the scenario, or its family, as
-    colour and shape, filled if
-    `is_hazard`. Each of the `limits` is a height and its words.
+    """Draw a mark for each row of `points`: `value` and `y`, with the scenario, or its family, as colour
+    and shape, filled if `is_hazard`. Each of the `limits` is a height and its words.
     """
     figure, [axis] = figure_style.blank_figure(4.5, 1, 1)
     scenarios = families_or_scenarios_of(points)

@@ -12,7 +12,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.outcomes.hazard_and_metric_judgement import judge_run
 from mutator.outcomes.trace_and_record_loading import load_target_record, load_trace
 from mutator.store.golden_runs import GoldenRun
-from mutator.store.planned_scenarios import planned_scenarios_of
+from mutator.store.planned_scenarios import concrete_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 
@@ -43,19 +43,18 @@ class FaultFreeRun:
 
 def load_fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
     """Return the fault-free runs of a run folder, sorted by name. MutatorError if one cannot be read."""
-    planned = planned_scenarios_of(folder.path)
+    concrete_by_name = concrete_scenarios_of(folder.path)
     runs = []
-    for golden_run in sorted(folder.kept_goldens):
+    for golden_run in sorted(folder.goldens_with_files):
         run_folder = folder.golden_folder(*golden_run)
-        of_family = planned.by_name.get(golden_run.scenario) if planned else None
-        concrete = of_family.scenario if of_family else None
+        concrete = concrete_by_name.get(golden_run.scenario)
         trace = load_trace(manifest, run_folder)
         judged = judge_run(manifest, trace, load_target_record(manifest, run_folder))
         plotted = [channel.name for channel in manifest.non_actuator_channels if channel.name in trace]
         runs.append(
             FaultFreeRun(
                 **golden_run._asdict(),
-                scenario_label=f"{concrete.family}, {concrete.label}" if concrete else golden_run.scenario,
+                scenario_label=concrete.label_with_family if concrete else golden_run.scenario,
                 family=concrete.family if concrete else "",
                 hazards=judged.hazards,
                 alerts=judged.alerts,

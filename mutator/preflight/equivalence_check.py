@@ -202,7 +202,7 @@ def _cached_sample_ids(
 
 def _traits_to_cover(experiment: Experiment) -> Iterator[tuple[str, ...]]:
     yield (experiment.fault.module, experiment.fault.fault_type)
-    yield (experiment.concrete.family if experiment.concrete else experiment.scenario,)
+    yield (experiment.family_or_scenario,)
 
 
 def reason_check_not_needed(folder: RunFolder) -> str | None:

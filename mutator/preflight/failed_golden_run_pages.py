@@ -47,7 +47,7 @@ def write_golden_run_pages(folder: RunFolder, workspace: Workspace) -> list[Path
     manifest = workspace.manifest(folder.head.target)
     failed = {check.name: check.detail for check in check_results(folder) if not check.passed}
     pages = []
-    for golden_run in folder.kept_goldens:
+    for golden_run in folder.goldens_with_files:
         detail = failed.get(f"golden {golden_run.key}")
         if detail is None:
             continue

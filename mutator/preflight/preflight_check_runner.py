@@ -206,7 +206,7 @@ class CheckRunner:
 
     def runs_needed_of(self, key: GoldenRun) -> frozenset[tuple[str, Any]]:
         """Return the runs that must end before a golden run can be judged."""
-        kinds = [FORKED] if key in self.driven_once else [GOLDEN, NULL_MUTANT]
+        kinds = [] if key in self.driven_once else [GOLDEN, NULL_MUTANT]
         if self.forked_golden_runs and self._is_of_family(key):
             kinds.append(FORKED)
         return frozenset((kind, key) for kind in kinds)
@@ -255,9 +255,7 @@ class CheckRunner:
             if name[0] == NULL_MUTANT and name[1] not in self.dropped:
                 self._keep_observations(name[1], job, execution)
             if name[0] == GOLDEN and not run.problem and name[1] not in self.dropped:
-                golden_folder = path_below(self.pending_folder / "golden", name[1].key)
-                golden_folder.parent.mkdir(parents=True, exist_ok=True)
-                execution.out.rename(golden_folder)
+                self._keep_output(name[1], execution)
             return run
         finally:
             remove_folder(scratch)
@@ -276,12 +274,15 @@ class CheckRunner:
             if key in self.driven_once and key not in self.dropped:
                 self._keep_observations(key, job, execution)
                 if not run.problem:
-                    golden_folder = path_below(self.pending_folder / "golden", key.key)
-                    golden_folder.parent.mkdir(parents=True, exist_ok=True)
-                    execution.out.rename(golden_folder)
+                    self._keep_output(key, execution)
             return run
         finally:
             remove_folder(scratch)
+
+    def _keep_output(self, key: GoldenRun, execution: JobResult) -> None:
+        golden_folder = path_below(self.pending_folder / "golden", key.key)
+        golden_folder.parent.mkdir(parents=True, exist_ok=True)
+        execution.out.rename(golden_folder)
 
     def _keep_observations(self, key: GoldenRun, job: Job, execution: JobResult) -> None:
         unreached_triggers.save_observations(

@@ -118,7 +118,7 @@ def describe_unreached_triggers(workspace: Workspace, folder: RunFolder) -> list
 
 
 def checks_and_goldens_exist(folder: RunFolder) -> bool:
-    folders = (folder.golden_folder(*golden_run) for golden_run in folder.kept_goldens)
+    folders = (folder.golden_folder(*golden_run) for golden_run in folder.goldens_with_files)
     goldens = (path_below(place, name) for place in folders for name in folder.head.golden_files)
     return all(path.is_file() for path in (folder.path / CHECKS_FILE, *goldens))
 
@@ -190,7 +190,7 @@ class PreflightChecks:
     def _passed_results(self, stored: dict[str, Any] | None, folder: Path) -> tuple[CheckResult, ...] | None:
         if stored is None or stored["digest"] != self.digest:
             return None
-        keys = [golden_run.key for golden_run in self.folder.kept_goldens]
+        keys = [golden_run.key for golden_run in self.folder.goldens_with_files]
         if any(
             output_digest_of(self.manifest, path_below(folder / "golden", key)) != stored["goldens"][key]
             for key in keys
@@ -224,7 +224,7 @@ class PreflightChecks:
             results.append(build_check_result("canary", canary_verdict.problem, canary_verdict.success))
         goldens = {golden_run.key: runs[GOLDEN, golden_run].output_digest for golden_run in self.golden_runs}
         self._check_goldens_same_as_before(goldens)
-        for golden_run in self.folder.kept_goldens:
+        for golden_run in self.folder.goldens_with_files:
             place = path_below(self.pending_folder / "golden", golden_run.key)
             if goldens[golden_run.key] and output_digest_of(self.manifest, place) != goldens[golden_run.key]:
                 raise MutatorError(
@@ -274,7 +274,7 @@ class PreflightChecks:
         CheckFailed if the experiments that have a record had another one.
         """
         self._check_goldens_same_as_before({golden_run.key: output_digest})
-        if golden_run not in self.folder.kept_goldens:
+        if golden_run not in self.folder.goldens_with_files:
             return
         copy = self.folder.scratch_folder / "placed"
         shutil.rmtree(copy, ignore_errors=True)
@@ -296,7 +296,7 @@ class PreflightChecks:
             pending_folder=pending_folder,
             observation_store=self.observation_store,
             with_forks=self._with_forks,
-            dropped=frozenset(self.golden_runs) - set(self.folder.kept_goldens),
+            dropped=frozenset(self.golden_runs) - set(self.folder.goldens_with_files),
         )
 
     def _store_in_run_folder(self, results: Mapping[str, Any]) -> None:

@@ -16,7 +16,7 @@ from mutator.statistics.family_statistics import FamilyShare, family_shares, sce
 from mutator.statistics.fault_free_drive_tables import load_judged_drives
 from mutator.statistics.results_frame import hazard_names
 from mutator.store.file_digests import FileDigest
-from mutator.store.planned_scenarios import planned_scenarios_of
+from mutator.store.planned_scenarios import concrete_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -40,10 +40,9 @@ class FamilyResults:
 def results_by_family(run: ReportedRun) -> list[FamilyResults]:
     """Return the results of each family of a run, in the order of run.json."""
     families = run.folder.head.families
-    planned = planned_scenarios_of(run.folder.path)
-    if not families or planned is None:
+    scenarios = [*concrete_scenarios_of(run.folder.path).values()]
+    if not families:
         return []
-    scenarios = [each.scenario for each in planned.by_name.values()]
     frame = scenarios_frame(families, scenarios, run.frame, load_judged_drives(run.folder))
     results = []
     for facts in families:

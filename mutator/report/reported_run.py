@@ -117,7 +117,7 @@ class ReportedRun:
         ends: dict[str, float] = {}
         try:
             manifest = self.workspace.manifest(self.folder.head.target)
-            for golden_run in self.folder.kept_goldens:
+            for golden_run in self.folder.goldens_with_files:
                 trace = load_trace(manifest, self.folder.golden_folder(*golden_run), [])
                 end = float(trace[manifest.time_channel][-1])
                 ends[golden_run.scenario] = max(end, ends.get(golden_run.scenario, end))

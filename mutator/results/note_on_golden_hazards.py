@@ -44,13 +44,13 @@ def golden_hazards_note(folder: RunFolder, results: "pd.DataFrame") -> str:
 
 
 def left_out_note_of_records(
-    records: Mapping[str, Record], count_by_ending: Mapping[str, int], planned: int
+    folder: RunFolder, records: Mapping[str, Record], count_by_ending: Mapping[str, int]
 ) -> str:
     """Like `left_out_note`, from the records of a run, which are read only if any was left out."""
     if not count_by_ending.get(Status.LEFT_OUT.value):
         return ""
     ids = [ending.experiment_id for ending in endings_of(records) if ending.status == Status.LEFT_OUT.value]
-    return left_out_note(Counter(records[name].detail for name in ids), planned)
+    return left_out_note(Counter(records[name].detail for name in ids), folder.planned_experiment_count)
 
 
 def left_out_note(count_by_reason: Mapping[str, int], planned: int) -> str:

@@ -8,7 +8,7 @@ from mutator.model import ConcreteScenario
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.golden_verdicts import GoldenVerdict, load_golden_verdicts
-from mutator.store.planned_scenarios import planned_scenarios_of
+from mutator.store.planned_scenarios import concrete_scenarios_of
 from mutator.store.run_folder import RunFolder
 
 _SECONDS_PER_HOUR = 3600.0
@@ -34,14 +34,9 @@ class JudgedDrive:
 
 def load_judged_drives(folder: RunFolder) -> tuple[JudgedDrive, ...]:
     """Return the golden runs with a stored verdict, in the order of the plan; none without families."""
-    verdicts, planned = load_golden_verdicts(folder), planned_scenarios_of(folder.path)
-    by_name = planned.by_name if planned else {}
+    verdicts, concrete_by_name = load_golden_verdicts(folder), concrete_scenarios_of(folder.path)
     return tuple(
-        JudgedDrive(
-            golden_run=run,
-            concrete=by_name[run.scenario].scenario if run.scenario in by_name else None,
-            verdict=verdicts[run.key],
-        )
+        JudgedDrive(golden_run=run, concrete=concrete_by_name.get(run.scenario), verdict=verdicts[run.key])
         for run in folder.golden_runs
         if run.key in verdicts
     )

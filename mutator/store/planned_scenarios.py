@@ -120,6 +120,12 @@ def planned_scenarios_of(run: Path) -> PlannedScenarios | None:
     return _cached_scenarios(run, state.st_mtime_ns, state.st_size)
 
 
+def concrete_scenarios_of(run: Path) -> dict[str, ConcreteScenario]:
+    """Return the concrete scenarios of a run folder by name, in the order of the plan."""
+    planned = planned_scenarios_of(run)
+    return {name: each.scenario for name, each in planned.by_name.items()} if planned else {}
+
+
 @lru_cache(maxsize=2)  # those of ten thousand scenarios take 20 MB
 def _cached_scenarios(run: Path, changed_ns: int, size: int) -> PlannedScenarios:
     return PlannedScenarios(run)

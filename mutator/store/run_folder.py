@@ -207,7 +207,7 @@ class RunFolder:
         return (*self.listed_goldens, *(planned.golden_runs() if planned else ()))
 
     @property
-    def kept_goldens(self) -> tuple[GoldenRun, ...]:
+    def goldens_with_files(self) -> tuple[GoldenRun, ...]:
         """The golden runs whose files the folder keeps: all, but for those of families if there is no
         experiment.
         """

@@ -64,9 +64,8 @@ class PlanFacts:
     experiments: int
     runs: int
     limits: Limits
-    include: GoldenClass | None = added_field(
-        None
-    )  # scenarios that run although their golden run has a hazard
+    # scenarios that run although their golden run has a hazard
+    include: GoldenClass | None = added_field(None)
     bench: BenchFacts | None = added_field(None)
 
 

@@ -67,8 +67,8 @@ def serve_as_first_process(connection_fd: int, start_message: dict[str, Any]) ->
     server.serve_requests()
 
 
-# what real files derive from; an `isinstance` with the abstract class `io.IOBase` takes 20 times as long
 _PID_LIMIT_FILE = Path("/proc/sys/kernel/pid_max")
+# what real files derive from; an `isinstance` with the abstract class `io.IOBase` takes 20 times as long
 _FILE_BASE: Any = io.IOBase.__mro__[1]
 
 
