@@ -9,59 +9,50 @@ from mutator.model import Status
 from mutator.outcomes.hazard_and_metric_judgement import load_judged_run
 from mutator.store import plan_file
 from mutator.store.checks_file import CHECKS_FILE
-from mutator.store.golden_verdicts import load_golden_verdicts
+from mutator.store.golden_verdicts import GoldenVerdict, load_golden_verdicts
 from mutator.store.planned_scenarios import planned_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 
 
-def golden_hazard_problems(folder: RunFolder, manifest: TargetManifest) -> Iterator[MutatorError]:
-    """Yield golden runs of which checks.json has other hazards than their traces."""
-    if not (folder.path / CHECKS_FILE).is_file():
-        return
-    stored = folder.golden_hazards
-    for golden_run in folder.goldens_with_files:
-        _, judged = load_judged_run(manifest, path_below(folder.path / "golden", golden_run.key))
-        hazards = tuple(sorted(judged.hazards, key=lambda hazard: (hazard[1], hazard[0])))
-        if stored.get(golden_run.key, ()) != hazards:
-            yield MutatorError(
-                f"hazards {stored.get(golden_run.key, ())} of golden run {golden_run.key}",
-                where=folder.path / CHECKS_FILE,
-                expected=f"{hazards}, as in its trace",
-            )
-
-
 def golden_verdict_problems(folder: RunFolder, manifest: TargetManifest) -> Iterator[MutatorError]:
-    """Yield golden runs whose verdict in checks.json is missing, differs from the trace that is kept, or has
-    other hazards than `golden_hazards`.
+    """Yield golden runs of which checks.json has other hazards, or another verdict, than the trace that is
+    kept, and those whose verdict is missing or has other hazards than `golden_hazards`.
     """
     path = folder.path / CHECKS_FILE
-    needs_verdicts = planned_scenarios_of(folder.path) is not None or not folder.head.experiments
-    if not path.is_file() or folder.is_bench or not needs_verdicts:
+    if not path.is_file():
         return
-    verdicts, runs_with_trace = load_golden_verdicts(folder), set(folder.goldens_with_files)
+    hazards_by_key, verdicts = folder.golden_hazards, load_golden_verdicts(folder)
+    has_families = planned_scenarios_of(folder.path) is not None
+    needs_verdicts = not folder.is_bench and (has_families or not folder.head.experiments)
     keys = {golden_run.key for golden_run in folder.golden_runs}
-    if keys != verdicts.keys():
+    if needs_verdicts and keys != verdicts.keys():
         yield MutatorError(
             f"{len(verdicts)} verdicts", where=path, expected=f"those of {len(keys)} golden runs"
         )
-        return
+        needs_verdicts = False  # to compare
+    runs_with_files = set(folder.goldens_with_files)
     for golden_run in folder.golden_runs:
-        verdict = verdicts[golden_run.key]
-        expected = {}
-        if golden_run in runs_with_trace:
-            trace, judged = load_judged_run(manifest, path_below(folder.path / "golden", golden_run.key))
-            duration_s = float(trace[manifest.time_channel][-1])
-            expected = {name: getattr(judged, name) for name in ("t_end", "hazards", "alerts", "metrics")}
-            expected["duration_s"] = duration_s
-        hazards = tuple(sorted(verdict.hazards, key=lambda hazard: (hazard[1], hazard[0])))
-        is_as_listed = folder.golden_hazards.get(golden_run.key, ()) == hazards
-        if not is_as_listed or any(getattr(verdict, name) != value for name, value in expected.items()):
-            yield MutatorError(
-                f"the verdict of golden run {golden_run.key}",
-                where=path,
-                expected="that of its trace, and the hazards in `golden_hazards`",
-            )
+        key = golden_run.key
+        hazards, verdict = hazards_by_key.get(key, ()), verdicts[key] if needs_verdicts else None
+        source = "trace" if golden_run in runs_with_files else "verdict"
+        judged = _verdict_of_trace(folder, manifest, key) if source == "trace" else verdict
+        if judged is not None and judged.hazards != hazards:
+            got, expected = f"hazards {hazards} of golden run {key}", f"{judged.hazards}, as in its {source}"
+            yield MutatorError(got, where=path, expected=expected)
+        if verdict != judged and needs_verdicts:
+            yield MutatorError(f"the verdict of golden run {key}", where=path, expected="that of its trace")
+
+
+def _verdict_of_trace(folder: RunFolder, manifest: TargetManifest, key: str) -> GoldenVerdict:
+    trace, judged = load_judged_run(manifest, path_below(folder.path / "golden", key))
+    return GoldenVerdict(
+        duration_s=float(trace[manifest.time_channel][-1]),
+        t_end=judged.t_end,
+        hazards=judged.hazards_by_time,
+        alerts=judged.alerts,
+        metrics=judged.metrics,
+    )
 
 
 def left_out_problems(folder: RunFolder, records: Sequence[StoredRecord]) -> Iterator[MutatorError]:

@@ -8,11 +8,7 @@ from pathlib import Path
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator._common.hashing import digest
-from mutator.audit.golden_hazard_audit import (
-    golden_hazard_problems,
-    golden_verdict_problems,
-    left_out_problems,
-)
+from mutator.audit.golden_hazard_audit import golden_verdict_problems, left_out_problems
 from mutator.audit.head_and_checks_audit import check_result_problems as checks_of
 from mutator.audit.head_and_checks_audit import (
     not_activated_run_problems,
@@ -84,11 +80,7 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
     )
     manifest = workspace.manifest(head.target) if workspace and not source_check.differences else None
     records, proven = load_stored_records(folder, "records"), load_stored_records(folder, "proof")
-    golden_hazards = (
-        chain(golden_hazard_problems(folder, manifest), golden_verdict_problems(folder, manifest))
-        if manifest
-        else ()
-    )
+    golden_hazards = golden_verdict_problems(folder, manifest) if manifest else ()
     idle = not_activated_run_problems(folder, manifest, records) if manifest else ()
     checks = [
         AuditCheck.from_problems(

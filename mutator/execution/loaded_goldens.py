@@ -86,8 +86,7 @@ class LoadedGoldens:
 
     def hazards_of(self, experiment: Experiment) -> HazardTimes:
         """Return the hazards of the golden run, by time."""
-        hazards = self.judgement_of(experiment).hazards
-        return tuple(sorted(hazards, key=lambda hazard: (hazard[1], hazard[0])))
+        return self.judgement_of(experiment).hazards_by_time
 
     def end_of(self, experiment: Experiment) -> GoldenEnd | None:
         """Return where a terminal hazard ends the golden run; None if none does."""

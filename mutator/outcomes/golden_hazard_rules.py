@@ -46,7 +46,7 @@ class HazardComparison:
 
 def drive_hazards_of(judged: RunJudgement, scale: SeverityScale | None) -> DriveHazards:
     """Return the hazards of a run, without those after the end of its drive."""
-    by_time = sorted(judged.hazards, key=lambda hazard: (hazard[1], hazard[0]))
+    by_time = judged.hazards_by_time
     times = tuple((name, time) for name, time in by_time if judged.t_end is None or time <= judged.t_end)
     classified = scale.worst_hazard(times, dict(judged.metrics), judged.t_end) if scale else None
     return DriveHazards(times=times, t_end=judged.t_end, classified=classified)

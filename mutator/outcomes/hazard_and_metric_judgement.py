@@ -32,10 +32,15 @@ _TIME_SLACK_S = 1e-9  # s; times are sums of steps
 class RunJudgement:
     """The judgement of a run. Times are in s."""
 
-    hazards: tuple[tuple[str, float], ...]  # name, first time
+    hazards: tuple[tuple[str, float], ...]  # name, first time, in the order of the manifest
     alerts: tuple[tuple[str, float], ...]  # name, time of every raise
     t_end: float | None  # when a terminal hazard ended the drive
     metrics: tuple[tuple[str, float], ...]  # including margins; metrics without a value are omitted
+
+    @property
+    def hazards_by_time(self) -> tuple[tuple[str, float], ...]:
+        """The hazards, the first to come first; those of the same time by name."""
+        return tuple(sorted(self.hazards, key=lambda hazard: (hazard[1], hazard[0])))
 
 
 def load_judged_run(

@@ -56,7 +56,7 @@ def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
         output_digest=output_digest_of(manifest, execution.out),
         trace_digest=trace_and_record_loading.trace_digest(manifest, execution.out),
         alerts=judged.alerts,
-        hazards=tuple(sorted(judged.hazards, key=lambda hazard: (hazard[1], hazard[0]))),
+        hazards=judged.hazards_by_time,
         t_end=judged.t_end,
         metrics=judged.metrics,
         duration_s=float(trace[manifest.time_channel][-1]) if len(trace[manifest.time_channel]) else 0.0,
@@ -66,7 +66,8 @@ def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
     )
 
 
-def verdict_of(run: CheckRun) -> GoldenVerdict:
+def golden_verdict_of(run: CheckRun) -> GoldenVerdict:
+    """Return what checks.json stores of a golden run."""
     return GoldenVerdict(
         duration_s=run.duration_s,
         t_end=run.t_end,

@@ -32,8 +32,8 @@ from mutator.preflight.check_judgements import (
 from mutator.preflight.check_run_problems import (
     CheckRun,
     equal_scenarios_problem,
+    golden_verdict_of,
     output_digest_of,
-    verdict_of,
 )
 from mutator.preflight.forked_golden_runs import describe_family_runs
 from mutator.preflight.preflight_check_runner import (
@@ -260,7 +260,7 @@ class PreflightChecks:
         """Return what golden runs came to, if some are those of families, or if there is no experiment."""
         if self.workspace.planned_scenarios is None and not self.campaign.is_fault_free:
             return {}
-        verdicts = {key.key: as_json_types(verdict_of(runs[GOLDEN, key])) for key in self.golden_runs}
+        verdicts = {key.key: as_json_types(golden_verdict_of(runs[GOLDEN, key])) for key in self.golden_runs}
         return {GOLDEN_VERDICTS_KEY: verdicts}
 
     def store_in_cache(self) -> None:

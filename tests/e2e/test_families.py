@@ -17,6 +17,7 @@ from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
 from mutator.store import file_digests
 from mutator.store.file_digests import FileDigest
+from mutator.store.golden_verdicts import load_golden_verdicts
 from mutator.store.plan_choices import Choices
 from mutator.store.planned_scenarios import SCENARIOS_FILE
 from mutator.store.preflight_results import check_results
@@ -253,6 +254,20 @@ def test_forged_results_of_drives_are_found(families: Workspace, tmp_path: Path)
     forge_digests(run)
     found = " ".join(map(str, mutator.verify(run, workspace=families).differences))
     assert "which the campaign draws" in found
+
+
+def test_hazards_of_a_drive_are_listed_by_time(families: Workspace, tmp_path: Path) -> None:
+    """Also if the manifest names the later one first."""
+    too_fast = "steps: 120\nspeed: 40\ngap: 70\nlead_speed: -10\nlead_brakes: 0.8\n"
+    (families.library / "scenarios" / "FAST.yaml").write_text(too_fast)
+    without_faults(families, 3)
+    campaign = families.campaign("toy")
+    campaign.write_text(campaign.read_text().replace("[A, ", "[A, FAST, "))
+    run_campaign(families, "toy", tmp_path / "run", engine="fork")
+    folder = RunFolder(tmp_path / "run")
+    assert [name for name, _ in folder.golden_hazards["FAST"]] == ["TOO_FAST", "H1"]
+    assert load_golden_verdicts(folder)["FAST"].hazards == folder.golden_hazards["FAST"]
+    assert mutator.verify(folder.path, workspace=families).differences == ()
 
 
 def plan_digest_of_drives(run: Path) -> str:
