@@ -85,6 +85,7 @@ def test_the_share_of_hazards_at_a_reaction_time_is_read_off_in_words(plots: Any
 
 def test_the_table_has_the_same_points_and_opens_them(plots: Any) -> None:
     plots.click("#value-plots .as-table summary")
+    plots.wait_for_selector("#value-plots .as-table button")  # the browser opens the table after the click
     buttons = plots.query_selector_all("#value-plots .as-table button")
     count = int(plots.inner_text("#value-plots figure:first-of-type > p").split()[0])
     assert len(buttons) == count > 1
