@@ -6,7 +6,7 @@ import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import is_same_record, manifest_of_unchanged_target, run_golden, run_single
 from mutator.figures.golden_and_faulty_plot import event_marks
 from mutator.limits import Limits, MeasuredLimits
-from mutator.model import Experiment, Record
+from mutator.model import Experiment, Record, Status
 from mutator.store.run_folder import RunFolder
 from mutator.targets.command_placeholders import fill_placeholders
 from mutator.targets.manifest import FILM_FOLDER, TargetManifest
@@ -46,7 +46,6 @@ class ExperimentFilmer:
     workspace: Workspace
     folder: RunFolder
     target: TargetManifest
-    film_recording_target: TargetManifest  # the same target, with film recording switched on
 
     @classmethod
     def of(cls, workspace: Workspace, folder: RunFolder) -> "ExperimentFilmer":
@@ -54,7 +53,8 @@ class ExperimentFilmer:
         run.
         """
         manifest = manifest_of_unchanged_target(workspace, folder)
-        return cls(workspace, folder, manifest, manifest.with_film_recording())
+        manifest.with_film_recording()  # raises the error
+        return cls(workspace, folder, manifest)
 
     @property
     def _limits(self) -> Limits:
@@ -62,9 +62,12 @@ class ExperimentFilmer:
         limits = self.folder.limits
         return limits_before_measuring(limits) if isinstance(limits, MeasuredLimits) else limits
 
-    def rerun_golden(self, experiment: Experiment, out: Path) -> Path:
-        """Rerun an experiment's golden run into the folder `out`."""
-        return run_golden(self.workspace, self.film_recording_target, experiment, out, limits=self._limits)
+    def rerun_golden(self, experiment: Experiment, out: Path, still_times: Iterable[float] = ()) -> Path:
+        """Rerun an experiment's golden run into the folder `out`, with a film, or only with what stills at
+        `still_times` need.
+        """
+        target = self.target.with_film_recording(still_times)
+        return run_golden(self.workspace, target, experiment, out, limits=self._limits)
 
     def rerun_and_write_shots(
         self,
@@ -81,7 +84,7 @@ class ExperimentFilmer:
         with ScratchFolder("mutator-film-") as scratch:
             single = run_single(
                 self.workspace,
-                self.film_recording_target,
+                self.target.with_film_recording(_still_times(shots, stored_record)),
                 experiment,
                 scratch,
                 limits=self._limits,
@@ -105,6 +108,15 @@ class ExperimentFilmer:
             }
             _write_shots(self.target, scratch, film_paths, shots)
         return is_same_record(self.folder, stored_record, record)
+
+
+def _still_times(shots: Sequence[Shot], record: Record | None) -> Sequence[float]:
+    """Return the times of `shots`, or () if they need the whole film: for a video, and for a run that may
+    crash before these times, whose last picture is then shown.
+    """
+    is_whole_run = record is not None and record.status is Status.OK
+    times = [shot.t for shot in shots if shot.t is not None]
+    return times if is_whole_run and len(times) == len(shots) else ()
 
 
 def describe_hazards(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:

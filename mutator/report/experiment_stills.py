@@ -1,6 +1,7 @@
 """Takes stills of the worst experiments whose controller gets camera frames."""
 
 import time
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from itertools import islice
@@ -56,13 +57,17 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, on_pro
     pool = ThreadPoolExecutor(max(1, workers))
     with ScratchFolder("mutator-stills-") as scratch:
         try:
-            experiment_by_golden = {
-                _golden_run_key(experiments[name]): experiments[name] for name in missing_stills
-            }
+            experiment_by_golden, times_by_golden = {}, defaultdict[str, list[float]](list)
+            for name, shots in missing_stills.items():
+                key = _golden_run_key(experiments[name])
+                experiment_by_golden[key] = experiments[name]
+                times_by_golden[key] += [shot.t for shot in shots if shot.t is not None]
             # golden runs are submitted first; otherwise all threads could wait for one that has not started
             goldens = {
-                key: pool.submit(filming.rerun_golden, future, path_below(scratch, key))
-                for key, future in experiment_by_golden.items()
+                key: pool.submit(
+                    filming.rerun_golden, experiment, path_below(scratch, key), times_by_golden[key]
+                )
+                for key, experiment in experiment_by_golden.items()
             }
             futures = [
                 pool.submit(take_and_report_problem, name, goldens[_golden_run_key(experiments[name])])

@@ -38,8 +38,8 @@ FILM_FOLDER = "film"  # the output folder of a filmed run
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FilmCommands:
     """The commands for `mutator show --video` and `--still`. In `run`, `{film}` is the folder for the film.
-    In `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of events,
-    `{out}` the file to write, and `{t}` the time of a still in s.
+    In `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of events, and
+    `{out}` the file to write. In `run_for_still` and `still`, `{t}` is the time of a still in s.
     """
 
     __pydantic_config__ = pydantic_mapping_config("Films")
@@ -48,6 +48,16 @@ class FilmCommands:
         metadata=yaml_metadata(
             "Extra arguments of the entry that make a run write a film.", alias="run", strict=False
         )
+    )
+    run_for_still_args: tuple[str, ...] = field(
+        default=(),
+        metadata=yaml_metadata(
+            "More extra arguments of the entry for a run that is filmed only for stills, once for each "
+            "still. The film then needs only the pictures nearest to these times, for a time after its end "
+            "the last one. Without these arguments, it has all.",
+            alias="run_for_still",
+            strict=False,
+        ),
     )
     module: str = field(metadata=yaml_metadata("The module that shows two films. It is run as `python -m`."))
     args: tuple[str, ...] = field(metadata=yaml_metadata("The module's arguments.", strict=False))
@@ -230,8 +240,10 @@ class TargetManifest:
         )
         return (self.root,) if any("{root}" in word for word in words) else ()
 
-    def with_film_recording(self) -> "TargetManifest":
-        """Return the same target, with runs that write a film; MutatorError if it cannot be filmed."""
+    def with_film_recording(self, still_times: Iterable[float] = ()) -> "TargetManifest":
+        """Return the same target, with runs that write a film, or only what stills at `still_times` (s) need.
+        MutatorError if it cannot be filmed.
+        """
         if self.film is None:
             raise MutatorError(
                 f"target {self.name} cannot be filmed",
@@ -239,7 +251,10 @@ class TargetManifest:
                 expected="`film` in its manifest",
                 remedy="add the commands that record and show a film",
             )
-        return replace(self, entry_args=(*self.entry_args, *self.film.run_args))
+        for_stills = (
+            word.replace("{t}", str(t)) for t in still_times for word in self.film.run_for_still_args
+        )
+        return replace(self, entry_args=(*self.entry_args, *self.film.run_args, *for_stills))
 
 
 def _names_used_in_criteria(

@@ -96,5 +96,6 @@ def _check_film_commands(film: FilmCommands, changes: Collection[str], source: Y
                 remedy="correct the name",
             )
     check_placeholders(film.run_args, FILMED_RUN_PLACEHOLDERS, source, ("film", "run"))
+    check_placeholders(film.run_for_still_args, ("t",), source, ("film", "run_for_still"))
     check_placeholders(film.args, FILM_PLACEHOLDERS, source, ("film", "args"))
     check_placeholders(film.still_args, FILM_PLACEHOLDERS, source, ("film", "still"))

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from selfdrive.common import compiled
 from selfdrive.common.errors import ConfigError, writing
+from selfdrive.sim.film.film_recorder import FilmOptions
 from selfdrive.sim.picture_options import (
     AUTHORS_CODE_DETECTOR,
     DETECTORS,
@@ -27,7 +28,7 @@ from selfdrive.sim.picture_options import (
     PictureOptions,
 )
 from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, with_plant
-from selfdrive.sim.simulator import SimulationResult, Simulator
+from selfdrive.sim.simulator import STEPS_PER_SECOND, SimulationResult, Simulator
 from selfdrive.sim.trace_file import npz_pieces
 
 EXIT_INVALID_INPUT = 2
@@ -84,7 +85,7 @@ def _open_run(options: argparse.Namespace) -> SteppedRun:
         scenario = replace(scenario, steps=min(scenario.steps, options.max_steps))
     compiled.use_libraries_in(None if options.forget else options.compiled)
     simulator = Simulator()
-    simulator.reset(scenario, options.seed, _picture_options(options), options.film)
+    simulator.reset(scenario, options.seed, _picture_options(options), _film_options(options, scenario))
     return SteppedRun(simulator)
 
 
@@ -142,8 +143,29 @@ def _parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--compiled", type=Path, metavar="DIR", help="find compiled code in this folder")
     parser.add_argument("--forget", action="store_true", help="use no cached detections and no compiled code")
     parser.add_argument("--film", type=Path, metavar="DIR", help="record the camera's frames in this folder")
+    parser.add_argument(
+        "--film-at",
+        type=_parse_number,
+        action="append",
+        default=[],
+        metavar="T",
+        help="save only the frames that a still at this time (s) needs; repeat for more stills",
+    )
     parser.add_argument("--max-steps", type=_parse_positive, metavar="N", help="stop after N steps of 10 ms")
     return parser.parse_args(arguments)
+
+
+def _film_options(options: argparse.Namespace, scenario: Scenario) -> FilmOptions | None:
+    if options.film is None:
+        if options.film_at:
+            raise ConfigError(
+                f"--film-at {options.film_at[0]:g}",
+                expected="--film with it",
+                remedy="give both, or leave it out",
+            )
+        return None
+    last_t = (scenario.steps - 1) / STEPS_PER_SECOND  # a still at a later time shows the last picture
+    return FilmOptions(folder=options.film, still_times=[min(t, last_t) for t in options.film_at])
 
 
 def _picture_options(options: argparse.Namespace) -> PictureOptions | None:

@@ -1,7 +1,6 @@
 """The closed loop of plant, sensors, camera and controller, in steps of 10 ms."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from selfdrive.manager import Manager
 from selfdrive.messages import Actuators, CanFrame
 from selfdrive.sim.actuators import ActuatorReceiver
 from selfdrive.sim.camera_and_detector import build_camera_and_detector
-from selfdrive.sim.film.film_recorder import FilmRecorder
+from selfdrive.sim.film.film_recorder import FilmOptions, FilmRecorder
 from selfdrive.sim.hazards import HazardMonitor
 from selfdrive.sim.lead import LeadVehicle
 from selfdrive.sim.picture_options import PictureOptions
@@ -49,9 +48,10 @@ class Simulator:
         scenario: Scenario,
         seed: int = 0,
         pictures: PictureOptions | None = None,
-        film: Path | None = None,
+        film: FilmOptions | None = None,
     ) -> None:
-        """Rebuild car, controller and recorder. `seed` is for the pictures; `film` is a folder for a film.
+        """Rebuild car, controller and recorder. `seed` is for the pictures. Without `film`, no film is
+        recorded.
 
         Raises ConfigError if the film cannot be written, or if pictures are unavailable or do not fit the
         scenario's road.

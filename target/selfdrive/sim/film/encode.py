@@ -3,10 +3,8 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-import av
 import cv2
 import numpy as np
-from PIL import Image
 
 from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.film import drawing
@@ -55,6 +53,8 @@ def _create_empty_file(path: Path) -> None:
 
 
 def _write_mp4(pictures: Iterable[np.ndarray], path: Path) -> None:
+    import av  # stills do not need it
+
     with av.open(str(path), "w", options={"movflags": "faststart"}) as file:
         stream = None
         for picture in pictures:
@@ -69,6 +69,8 @@ def _write_mp4(pictures: Iterable[np.ndarray], path: Path) -> None:
 
 def _write_gif(pictures: Iterable[np.ndarray], path: Path) -> None:
     """Write fewer pictures with one palette: the sheet's own colours, then those of the middle picture."""
+    from PIL import Image  # stills do not need it
+
     small = []
     for index, picture in enumerate(pictures):
         if index % PICTURES_PER_GIF_FRAME == 0:

@@ -1,19 +1,21 @@
 """Records camera frames and the controller's view of them.
 
 A film is a folder: `film.jsonl`, with a heading and a line for each picture, and the pictures as JPEG files.
-It is written during the run, so an aborted run has a film up to that point.
+It is written during the run, so an aborted run has a film up to that point. For stills, the pictures near
+their times are enough.
 """
 
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import writing
+from selfdrive.common.realtime import DT_MDL
 from selfdrive.manager import Manager
 from selfdrive.messages import VIEW_LENGTH, CameraView, ModelData
 from selfdrive.sim.truth import GroundTruth
@@ -24,11 +26,22 @@ SAMPLE_DISTANCES = tuple(range(0, VIEW_LENGTH, 7))  # m ahead, where lines are r
 JPEG_QUALITY = 95  # high, to preserve noise from effects
 
 
-class FilmRecorder:
-    """A film being recorded in `folder`. If recording fails, the run ends with ConfigError."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilmOptions:
+    """Where a film is recorded. With `still_times` (s), it has only the pictures that stills at these times
+    need.
+    """
 
-    def __init__(self, folder: Path, camera: CameraModel) -> None:
-        self._folder = folder
+    folder: Path
+    still_times: Sequence[float] = ()
+
+
+class FilmRecorder:
+    """A film being recorded. If recording fails, the run ends with ConfigError."""
+
+    def __init__(self, options: FilmOptions, camera: CameraModel) -> None:
+        self._folder = folder = options.folder
+        self._still_times = options.still_times
         self._count = 0
         with self._writing():
             folder.mkdir(parents=True, exist_ok=True)
@@ -48,7 +61,7 @@ class FilmRecorder:
             "v_ego": truth.v_ego,
             "d_rel": None if truth.free_road else truth.d_rel,
             "bend": _sample(view.bend),
-            "picture": self._save_picture(view),
+            "picture": self._save_picture(view, truth.t),
             "seen": _detections_as_json(manager.visiond.latest, truth.t),
             "plan": [_polynomial_value(manager.controlsd.plan.d_poly, x) for x in SAMPLE_DISTANCES],
             "radar": lead.d_rel if lead and lead.status else None,
@@ -60,12 +73,15 @@ class FilmRecorder:
             file.write(_json_line(entry))
         self._count += 1
 
-    def _save_picture(self, view: CameraView) -> str | None:
+    def _save_picture(self, view: CameraView, t: float) -> str | None:
+        """Return the picture's file name, also if no still needs the file."""
         if view.picture is None:
             return None
+        name = f"{self._count:05d}.jpg"
+        if self._still_times and all(abs(t - still) > DT_MDL for still in self._still_times):
+            return name  # the picture is not even drawn
         import cv2  # not needed in runs without pictures
 
-        name = f"{self._count:05d}.jpg"
         data = cv2.imencode(".jpg", np.asarray(view.picture), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
         with self._writing():
             (self._folder / name).write_bytes(data)

@@ -1,11 +1,13 @@
 """The descriptions of hazards in a film, and the drawing of shots."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.report.experiment_filming import Shot, _write_shots, describe_hazards
+from mutator.model import Record, Status
+from mutator.report.experiment_filming import Shot, _still_times, _write_shots, describe_hazards
 from mutator.workspace import Workspace
 
 
@@ -14,6 +16,16 @@ def test_a_film_describes_a_hazard_as_the_page_does() -> None:
     manifest = workspace.manifest("openpilot")
     assert describe_hazards(workspace, manifest) == {rule.name: rule.about for rule in manifest.hazard_rules}
     assert "touches" in describe_hazards(workspace, manifest)["H1"]
+
+
+def test_a_film_is_whole_unless_it_is_for_stills_of_a_finished_run(
+    record: Callable[..., Record],
+) -> None:
+    still, video = Shot(path=Path("a.jpg"), t=2.0), Shot(path=Path("a.mp4"))
+    finished, crashed = record(), record(status=Status.CRASHED)
+    assert _still_times([still, still], finished) == [2.0, 2.0]
+    assert _still_times([still, video], finished) == ()
+    assert _still_times([still], crashed) == _still_times([still], None) == ()
 
 
 def test_all_shots_of_a_run_are_drawn_in_one_process(toycar: Workspace, tmp_path: Path) -> None:

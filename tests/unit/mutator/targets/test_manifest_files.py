@@ -105,6 +105,10 @@ def test_a_film_adds_arguments(toy: Workspace) -> None:
         "--film",
         "o/film",
     )
+    path.write_text(plain + film.replace("module", 'run_for_still: [--at, "{t}"], module'))
+    for_stills = toy.manifest("toy").with_film_recording([1.5, 2.0])
+    given_for_stills = for_stills.run_arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"))
+    assert given_for_stills == (*given, "--at", "1.5", "--at", "2.0")
     assert filmed.tree.digest == toy.manifest("toy").tree.digest
     path.write_text(plain + film.replace("toycar.show", "toycar/show"))
     with pytest.raises(MutatorError, match="'toycar/show'; expected a dotted module name"):

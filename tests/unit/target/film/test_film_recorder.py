@@ -47,6 +47,27 @@ def test_the_film_has_the_frames_that_the_detector_got(drive, seeing):
     assert np.abs(frame.load_picture().astype(int) - own).mean() < 1.0
 
 
+def test_a_film_for_stills_has_the_same_pictures_but_only_near_their_times(drive, seeing):
+    """A still at a time after the end shows the last picture."""
+    whole, still = drive(*seeing), drive(*seeing, "--film-at", "0.21", "--film-at", "9")
+    assert outputs(whole) == outputs(still)
+    names = [path.name for path in sorted((still / "film").iterdir())]
+    assert names == ["00004.jpg", "00005.jpg", "00009.jpg", "film.jsonl"]
+    assert all((still / "film" / name).read_bytes() == (whole / "film" / name).read_bytes() for name in names)
+
+
+def test_a_picture_that_was_not_recorded_is_not_replaced_by_a_drawing(drive, seeing):
+    frames = load_film(drive(*seeing, "--film-at", "0.2") / "film").frames
+    with pytest.raises(ConfigError, match=r"00000\.jpg: unreadable"):
+        frames[0].load_picture()
+
+
+def test_times_of_stills_without_a_film_are_refused(tmp_path, capsys):
+    words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path), "--film-at", "2"]
+    assert main(words) == 2
+    assert "--film-at 2, expected --film with it" in capsys.readouterr().err
+
+
 def test_a_film_of_a_free_road_has_no_lead(drive):
     assert load_film(drive("--no-lead") / "film").frames[-1].d_rel is None
 
