@@ -138,10 +138,12 @@ def remove_anything_at(path: Path) -> None:
 
 
 class ScratchFolder:
-    """A temporary folder for runs to write to, deleted together with this object."""
+    """A temporary folder for runs to write to, in `parent` (None: the system's), deleted together with this
+    object.
+    """
 
-    def __init__(self, prefix: str) -> None:
-        self.path = Path(tempfile.mkdtemp(prefix=prefix)).resolve()
+    def __init__(self, prefix: str, parent: Path | None = None) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix=prefix, dir=parent)).resolve()
         self._end = weakref.finalize(self, remove_folder, self.path)
 
     def __enter__(self) -> Path:

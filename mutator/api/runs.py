@@ -46,6 +46,7 @@ from mutator.statistics.mutation_score import mutation_score_sheet, totals_table
 from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import run_deletion
+from mutator.store.golden_files import GOLDEN_FOLDER, stored_golden_keys
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.planned_scenarios import concrete_scenarios_of
 from mutator.store.run_folder import RunFolder
@@ -225,7 +226,7 @@ class Run(RunFigures):
         golden_run = GoldenRun(scenario, changes or (), golden_seed)
         folder = self.folder.golden_folder(*golden_run)
         if not folder.is_dir():
-            golden_names = sorted(path.name for path in (self.path / "golden").glob("*"))
+            golden_names = stored_golden_keys(self.path / GOLDEN_FOLDER)
             raise MutatorError(
                 f"no golden run {golden_run.key}",
                 where=self.path,

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 
-from mutator._common.confined_files import path_below
 from mutator.audit.record_audit import StoredRecord
 from mutator.errors import MutatorError
 from mutator.model import Status
 from mutator.outcomes.hazard_and_metric_judgement import load_judged_run
 from mutator.store import plan_file
 from mutator.store.checks_file import CHECKS_FILE
+from mutator.store.golden_files import GOLDEN_FOLDER, golden_output_folder
 from mutator.store.golden_verdicts import GoldenVerdict, load_golden_verdicts
 from mutator.store.planned_scenarios import planned_scenarios_of
 from mutator.store.run_folder import RunFolder
@@ -45,7 +45,7 @@ def golden_verdict_problems(folder: RunFolder, manifest: TargetManifest) -> Iter
 
 
 def _verdict_of_trace(folder: RunFolder, manifest: TargetManifest, key: str) -> GoldenVerdict:
-    trace, judged = load_judged_run(manifest, path_below(folder.path / "golden", key))
+    trace, judged = load_judged_run(manifest, golden_output_folder(folder.path / GOLDEN_FOLDER, key))
     return GoldenVerdict(
         duration_s=float(trace[manifest.time_channel][-1]),
         t_end=judged.t_end,

@@ -17,15 +17,22 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical_json, digest
 from mutator.campaigns.plan_freezing import PLAN_CSV
+from mutator.errors import MutatorError
 from mutator.store import file_digests, plan_file
 from mutator.store.checks_file import CHECKED_GOLDENS_KEY, CHECKS_SCHEMA, MEASURED_LIMITS_KEY
 from mutator.store.checks_file import CHECKS_FILE as CHECKS
 from mutator.store.checksummed_lines import intact_lines, unread_segment
+from mutator.store.golden_files import (
+    GOLDEN_FOLDER,
+    list_golden_files,
+    read_golden_files,
+    stored_golden,
+    stored_golden_keys,
+)
 from mutator.store.recorded_approvals import review_digest
 from mutator.store.records import PROOF_FOLDER, parse_ending
 from mutator.store.run_folder import RunFolder
@@ -139,16 +146,23 @@ def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
     """Digest of each golden run's files `names` (trace and record)."""
     digests = {}
     for golden_run in folder.goldens_with_files:
-        golden_folder = folder.golden_folder(*golden_run)
-        files = [digest(read_bounded(path_below(golden_folder, name))) for name in names]
-        digests[golden_run.key] = digest(files)
+        files = read_golden_files(folder.path / GOLDEN_FOLDER, golden_run.key)
+        if missing := [name for name in names if name not in files]:
+            raise MutatorError(f"golden run {golden_run.key} has no {missing[0]}", where=folder.path)
+        digests[golden_run.key] = digest([digest(files[name]) for name in names])
     return digests
 
 
 def golden_file_digests(folder: RunFolder) -> dict[str, str]:
-    """SHA-256 of every file of the golden runs, by name in the run folder."""
-    paths = sorted(path for path in (folder.path / "golden").rglob("*") if path.is_file())
-    return _sha256_by_name(folder, [path.relative_to(folder.path).as_posix() for path in paths])
+    """SHA-256 of every file of the golden runs, by its name in the run folder if no run were packed."""
+    golden = folder.path / GOLDEN_FOLDER
+    stored = [stored_golden(golden, key) for key in stored_golden_keys(golden)]
+    unpacked = (path for run in stored if run.is_dir() for path in list_golden_files(run))
+    digests = _sha256_by_name(folder, [path.relative_to(folder.path).as_posix() for path in unpacked])
+    for key in (path.stem for path in stored if path.is_file()):
+        files = read_golden_files(golden, key)
+        digests |= {f"{GOLDEN_FOLDER}/{key}/{name}": digest(data) for name, data in files.items()}
+    return digests
 
 
 def _sha256_by_name(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:

@@ -10,6 +10,7 @@ from mutator.outcomes.hazard_and_metric_judgement import load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
 from mutator.store import plan_file
 from mutator.store.checksummed_blocks import read_blocks
+from mutator.store.golden_files import GOLDEN_FOLDER, golden_output_folder
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_format import Series, decode_series
 from mutator.store.series_packing import list_unpacked_worker_files
@@ -78,7 +79,9 @@ def _kept_series_problems(
                     golden, SeriesSampler(manifest, load_manifest_channels(manifest, run)).golden
                 ):
                     raise MutatorError(
-                        "differs", where=path, expected=f"the series of {run.relative_to(folder.path)}"
+                        "differs",
+                        where=path,
+                        expected=f"the series of golden/{folder.golden_run_of(planned[name]).key}",
                     )
         except MutatorError as err:
             yield _error_with_remedy(err, err.got, f"{rerun_command(folder.path, name)} rebuilds it")
@@ -155,7 +158,8 @@ def _other_golden_problems(
         try:
             stored = decode_series(series_folder.read_entry(number))
             golden = SeriesSampler(
-                manifest, load_manifest_channels(manifest, path_below(folder.path, f"golden/{key}"))
+                manifest,
+                load_manifest_channels(manifest, golden_output_folder(folder.path / GOLDEN_FOLDER, key)),
             ).golden
         except MutatorError:  # reported elsewhere
             continue

@@ -7,11 +7,12 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from mutator._common.confined_files import checked_relative_path, path_below, unlink_below, write_below
+from mutator._common.confined_files import checked_relative_path, unlink_below, write_below
 from mutator.audit.series_audit import audit_series
 from mutator.errors import MutatorError
 from mutator.outcomes.hazard_and_metric_judgement import load_manifest_channels
 from mutator.outcomes.series_sampling import SeriesSampler
+from mutator.store.golden_files import GOLDEN_FOLDER, golden_output_folder
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import WORKER_FILE_SUFFIX, repack_series
 from mutator.store.series_script import script_bytes, script_name_of
@@ -61,7 +62,7 @@ def _rebuilt_golden_chunk(
     try:
         manifest = workspace.manifest(folder.head.target)
         goldens = [
-            load_manifest_channels(manifest, path_below(folder.path / "golden", keys[number]))
+            load_manifest_channels(manifest, golden_output_folder(folder.path / GOLDEN_FOLDER, keys[number]))
             for number in numbers
         ]
     except MutatorError:

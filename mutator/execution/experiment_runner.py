@@ -243,7 +243,7 @@ class ExperimentRunner:
         """Raise MutatorError if a run has written to what this experiment used, so its record would not
         count.
         """
-        self.goldens.check_unchanged(self.goldens.folder_of(experiment))
+        self.goldens.check_unchanged(experiment)
         scenario = self.scenario_file(experiment.scenario)
         if digest(read_bounded(scenario)) != experiment.scenario_digest:
             raise changed_file_error(scenario)

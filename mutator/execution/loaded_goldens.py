@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below
@@ -23,6 +23,13 @@ _T = TypeVar("_T")
 _MOST_GOLDENS_IN_MEMORY = 32  # golden runs in memory: enough for the current seed and the next
 
 
+class _GoldenOutput(NamedTuple):
+    """A golden run and the folder with its output, which is another one whenever it is unpacked again."""
+
+    key: str
+    folder: Path
+
+
 class LoadedGoldens:
     """The channels of golden runs, loaded on request. Only the last few are kept in memory."""
 
@@ -32,57 +39,64 @@ class LoadedGoldens:
         folder_of: Callable[[Experiment], Path],
         *,
         several_seeds: bool = False,
-        digests: Mapping[Path, str] | None = None,
+        digests: Mapping[str, str] | None = None,
     ) -> None:
         self.folder_of = folder_of  # finds the output folder of the fault-free run
         self._manifest = manifest
         self._several_seeds = several_seeds
-        self._digests = digests  # what `output_digest_of` must return, by folder
-        self._files_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._read_verified_files)
-        self._trace_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
-            lambda folder: self._load_unchanged(folder, load_manifest_channels)
+        self._digests = digests  # what `output_digest_of` must return, by key
+        self._files_of_output = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._read_verified_files)
+        self._trace_of_output = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
+            lambda output: self._load_unchanged(output, load_manifest_channels)
         )
-        self._sampler_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
-            lambda folder: SeriesSampler(manifest, self._trace_of_folder(folder))
+        self._sampler_of_output = lru_cache(_MOST_GOLDENS_IN_MEMORY)(
+            lambda output: SeriesSampler(manifest, self._trace_of_output(output))
         )
-        self._judged_of_folder = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._judge)
+        self._judged_of_output = lru_cache(_MOST_GOLDENS_IN_MEMORY)(self._judge)
 
     def read_and_verify_files_of(self, experiment: Experiment) -> None:
         """Read the golden run's files before they are used. MutatorError if their digest is another."""
-        self._files_of_folder(self.folder_of(experiment))
+        self._files_of_output(self._output_of(experiment))
 
-    def check_unchanged(self, folder: Path) -> None:
+    def check_unchanged(self, experiment: Experiment) -> None:
         """Raise MutatorError if the files of a golden run have been written to since they were read."""
-        if changed := self._files_of_folder(folder).first_changed_path():
+        self._check_output_unchanged(self._output_of(experiment))
+
+    def _check_output_unchanged(self, output: _GoldenOutput) -> None:
+        if changed := self._files_of_output(output).first_changed_path():
             raise changed_file_error(Path(changed))
 
-    def _load_unchanged(self, folder: Path, load: Callable[[TargetManifest, Path], _T]) -> _T:
-        self._files_of_folder(folder)
-        loaded = load(self._manifest, folder)
-        self.check_unchanged(folder)
+    def _load_unchanged(self, output: _GoldenOutput, load: Callable[[TargetManifest, Path], _T]) -> _T:
+        self._files_of_output(output)
+        loaded = load(self._manifest, output.folder)
+        self._check_output_unchanged(output)
         return loaded
 
-    def _read_verified_files(self, folder: Path) -> FileChangeDetector:
+    def _read_verified_files(self, output: _GoldenOutput) -> FileChangeDetector:
+        key, folder = output
         paths = [path for name in self._manifest.output_files if (path := path_below(folder, name)).is_file()]
         files = FileChangeDetector({str(path): read_bounded(path) for path in paths})
-        if self._digests is not None and output_digest_of(self._manifest, folder) != self._digests[folder]:
+        if self._digests is not None and output_digest_of(self._manifest, folder) != self._digests[key]:
             raise changed_file_error(folder)
         return files
 
-    def _judge(self, folder: Path) -> RunJudgement:
-        trace = self._trace_of_folder(folder)
-        record = self._load_unchanged(folder, load_target_record)
+    def _judge(self, output: _GoldenOutput) -> RunJudgement:
+        trace = self._trace_of_output(output)
+        record = self._load_unchanged(output, load_target_record)
         return judge_run(self._manifest, trace, record, golden=trace)
 
     def golden_key_of(self, experiment: Experiment) -> str:
         return GoldenRun.for_experiment(experiment, several_seeds=self._several_seeds).key
 
+    def _output_of(self, experiment: Experiment) -> _GoldenOutput:
+        return _GoldenOutput(self.golden_key_of(experiment), self.folder_of(experiment))
+
     def trace_of(self, experiment: Experiment) -> Trace:
-        return self._trace_of_folder(self.folder_of(experiment))
+        return self._trace_of_output(self._output_of(experiment))
 
     def judgement_of(self, experiment: Experiment) -> RunJudgement:
         """Return the judgement of the golden run, with the metrics that compare a run with golden, too."""
-        return self._judged_of_folder(self.folder_of(experiment))
+        return self._judged_of_output(self._output_of(experiment))
 
     def hazards_of(self, experiment: Experiment) -> HazardTimes:
         """Return the hazards of the golden run, by time."""
@@ -101,7 +115,7 @@ class LoadedGoldens:
         return self._manifest.step_s
 
     def sampler_of(self, experiment: Experiment) -> SeriesSampler:
-        return self._sampler_of_folder(self.folder_of(experiment))
+        return self._sampler_of_output(self._output_of(experiment))
 
 
 def changed_file_error(path: Path) -> MutatorError:

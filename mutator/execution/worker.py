@@ -8,7 +8,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator._common.folder_locks import open_worker_lock
 from mutator._common.pickled_values import PickledValue
@@ -33,6 +32,7 @@ from mutator.execution.worker_runners import WorkerRunners
 from mutator.execution.written_files import FileDigests
 from mutator.model import Experiment, Record, Status
 from mutator.mutants.mutant_building import Mutant
+from mutator.store.golden_files import GOLDEN_FOLDER, GoldenFolders
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter
 from mutator.store.timings import ending_text
@@ -78,7 +78,8 @@ class Worker:
         self._manifest, self._assignment = inputs.manifest, assignment
         self._scenario_files = dict(inputs.scenario_files)
         self._planned_scenarios = inputs.planned_scenarios
-        self._digest_by_golden_folder: dict[Path, str] = {}
+        self._golden_folders = GoldenFolders(self.folder.scratch_folder)
+        self._digest_by_golden: dict[str, str] = {}  # by key
         self._reuse = (
             RunReuse(assignment.reuse, self.folder, assignment.worker_name, self._golden_digest_of)
             if assignment.reuse
@@ -102,8 +103,10 @@ class Worker:
                 secret=assignment.secret,
             ),
             assignment.engine,
-            golden_folder_of=self.folder.golden_folder_of,
-            digest_by_golden_folder=self._digest_by_golden_folder,
+            golden_folder_of=lambda experiment: self._golden_folders.output_folder(
+                self.folder.path / GOLDEN_FOLDER, self.folder.golden_run_of(experiment).key
+            ),
+            digest_by_golden=self._digest_by_golden,
             has_seeded_goldens=self.folder.has_seeded_goldens,
             scenario_file=self._scenario_file,
             with_series=bool(self.folder.series_budget_mb),
@@ -153,10 +156,7 @@ class Worker:
     ) -> None:
         """Add digests of golden runs, by key, and files of scenarios, for a plan that has grown."""
         self._scenario_files |= scenario_files or {}
-        self._digest_by_golden_folder |= {
-            path_below(self.folder.path / "golden", key): golden_digest
-            for key, golden_digest in (goldens or {}).items()
-        }
+        self._digest_by_golden |= goldens or {}
         if goldens and self._reuse:
             self._reuse.note_new_goldens()
         if goldens and self._recording:
@@ -180,7 +180,7 @@ class Worker:
         return next((run for run in runs if run), None)
 
     def _golden_digest_of(self, experiment: Experiment) -> str:
-        return self._digest_by_golden_folder[self.folder.golden_folder_of(experiment)]
+        return self._digest_by_golden[self.folder.golden_run_of(experiment).key]
 
     def prove_experiments(self, experiments: Sequence[Experiment]) -> Iterator[Record]:
         """Run experiments on the reference engine for the proof, and yield their records."""

@@ -24,9 +24,9 @@ from mutator.model import Experiment
 class WorkerRunners:
     """Runs experiments on the engine `engine_name`, and again on an independent engine for the proof.
 
-    `golden_folder_of` finds the golden run of an experiment; `digest_by_golden_folder` has the digests of its
-    files, and can grow. `find_copied_run` and `find_proof` find what need not run, there and for the proof.
-    The engine is made at once, so that what it lacks is known before any work.
+    `golden_folder_of` finds the golden run of an experiment; `digest_by_golden` has the digests of their
+    files by key, and can grow. `find_copied_run` and `find_proof` find what need not run, there and for the
+    proof. The engine is made at once, so that what it lacks is known before any work.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class WorkerRunners:
         engine_name: str,
         *,
         golden_folder_of: Callable[[Experiment], Path],
-        digest_by_golden_folder: Mapping[Path, str],
+        digest_by_golden: Mapping[str, str],
         has_seeded_goldens: bool,
         scenario_file: Callable[[str], Path],
         with_series: bool,
@@ -44,7 +44,7 @@ class WorkerRunners:
         find_proof: FindCopiedRun = find_nothing,
     ) -> None:
         self._arguments, self._manifest = arguments, arguments.manifest
-        self._golden_folder_of, self._digest_by_golden_folder = golden_folder_of, digest_by_golden_folder
+        self._golden_folder_of, self._digest_by_golden = golden_folder_of, digest_by_golden
         self._has_seeded_goldens, self._scenario_file = has_seeded_goldens, scenario_file
         self._golden_hazard_rules = golden_hazard_rules
         self._runner = self._make_runner(
@@ -98,7 +98,7 @@ class WorkerRunners:
             self._manifest,
             self._golden_folder_of,
             several_seeds=self._has_seeded_goldens,
-            digests=self._digest_by_golden_folder,
+            digests=self._digest_by_golden,
         )
         return ExperimentRunner(
             self._manifest,

@@ -1,6 +1,5 @@
 """The checks of a bench: of each golden run once, with its null mutant, when a batch first needs it."""
 
-import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -8,7 +7,6 @@ from typing import Any
 
 from mutator._common import cached_folders
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import path_below
 from mutator._common.files import json_bytes, read_json, remove_folder, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
@@ -26,7 +24,7 @@ from mutator.preflight.check_judgements import (
     loaded_packages,
     unpackaged_modules,
 )
-from mutator.preflight.check_run_problems import output_digest_of
+from mutator.preflight.check_run_problems import golden_output_digest
 from mutator.preflight.preflight_check_runner import GOLDEN, CheckRunner
 from mutator.store import file_digests
 from mutator.store.checks_file import (
@@ -40,6 +38,13 @@ from mutator.store.checks_file import (
     unpackaged_modules_as_json,
 )
 from mutator.store.file_digests import FileDigest
+from mutator.store.golden_files import (
+    GOLDEN_FOLDER,
+    copy_golden,
+    list_golden_files,
+    move_golden,
+    stored_golden,
+)
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.preflight_results import CheckResult
 from mutator.store.run_progress import ProgressCallback
@@ -119,9 +124,9 @@ class BenchChecks:
         checked_values = stored[CHECKED_GOLDENS_KEY].items()
         checked = {key: CheckedGolden.from_json(values) for key, values in checked_values}
         for golden_run in golden_runs:
-            folder = path_below(run / "golden", golden_run.key)
             golden = checked.get(golden_run.key)
-            if golden is None or output_digest_of(self.manifest, folder) != golden.output_digest:
+            stored_digest = golden_output_digest(self.manifest, run / GOLDEN_FOLDER, golden_run.key)
+            if golden is None or stored_digest != golden.output_digest:
                 continue
             if stored["digest"] == _environment_digest():
                 self.goldens[golden_run] = golden
@@ -184,16 +189,12 @@ class BenchChecks:
         failed = [result for result in (*results, *([canary] if canary else [])) if not result.passed]
         if not failed:
             for golden_run in new:
-                self._move_to_pending(
-                    path_below(runner.pending_folder / "golden", golden_run.key), golden_run
-                )
+                self._move_to_pending(runner.pending_folder / GOLDEN_FOLDER, golden_run)
                 self._store_in_cache(golden_run)
         return failed
 
-    def _move_to_pending(self, source: Path, golden_run: GoldenRun) -> None:
-        destination = path_below(self.pending_folder / "golden", golden_run.key)
-        destination.parent.mkdir(parents=True, exist_ok=True)
-        source.rename(destination)
+    def _move_to_pending(self, golden: Path, golden_run: GoldenRun) -> None:
+        move_golden(stored_golden(golden, golden_run.key), self.pending_folder / GOLDEN_FOLDER)
 
     def _changed_golden_results(self, new: Iterable[GoldenRun]) -> Iterator[CheckResult]:
         """Yield a failed check for each golden run that differs from the one the bench began with."""
@@ -225,19 +226,18 @@ class BenchChecks:
         """Move new golden runs into the run folder, and write checks.json."""
         files: dict[str, FileDigest | None] = {}
         for golden_run in new:
-            for path in sorted(path_below(self.pending_folder / "golden", golden_run.key).rglob("*")):
-                if path.is_file():
-                    name = path.relative_to(self.pending_folder).as_posix()
-                    files[name] = FileDigest.of_bytes(read_bounded(path))
+            for path in list_golden_files(self._pending_golden(golden_run)):
+                name = path.relative_to(self.pending_folder).as_posix()
+                files[name] = FileDigest.of_bytes(read_bounded(path))
         checks = json_bytes(self._as_json(golden_runs))
         with file_digests.announcing_rewrites(run, {**files, CHECKS_FILE: FileDigest.of_bytes(checks)}):
             for golden_run in new:
-                destination = path_below(run / "golden", golden_run.key)
-                shutil.rmtree(destination, ignore_errors=True)
-                destination.parent.mkdir(parents=True, exist_ok=True)
-                path_below(self.pending_folder / "golden", golden_run.key).rename(destination)
+                move_golden(self._pending_golden(golden_run), run / GOLDEN_FOLDER)
             write_atomic(run / CHECKS_FILE, checks)
         self._stored |= set(new)
+
+    def _pending_golden(self, golden_run: GoldenRun) -> Path:
+        return stored_golden(self.pending_folder / GOLDEN_FOLDER, golden_run.key)
 
     def _as_json(self, golden_runs: Sequence[GoldenRun]) -> dict[str, Any]:
         checked = [self.goldens[golden_run] for golden_run in golden_runs]
@@ -304,7 +304,7 @@ class BenchChecks:
         path = self._cached_path(golden_run)
 
         def fill(entry: Path) -> None:
-            shutil.copytree(path_below(self.pending_folder / "golden", golden_run.key), entry / "golden")
+            copy_golden(self.pending_folder / GOLDEN_FOLDER, golden_run.key, entry / GOLDEN_FOLDER)
             facts = {"schema": _CACHED_FACTS_SCHEMA, **self.goldens[golden_run].as_json()}
             write_atomic(entry / _CACHED_FACTS_FILE, json_bytes(facts))
 
@@ -321,18 +321,19 @@ class BenchChecks:
             facts = read_json(copy / _CACHED_FACTS_FILE, _CACHED_FACTS_SCHEMA)
             facts.pop("schema")
             golden = CheckedGolden.from_json(facts)
+            copied_digest = golden_output_digest(self.manifest, copy / GOLDEN_FOLDER, golden_run.key)
         except (MutatorError, OSError, KeyError, TypeError, AttributeError):
             return False  # missing or damaged
         if not all(result.passed for result in golden.results):
             return False
-        digests = {output_digest_of(self.manifest, copy / "golden"), golden.output_digest}
+        digests = {copied_digest, golden.output_digest}
         if self.passed_goldens.get(path) != golden:
             again = replace(self._runner([golden_run], None), pending_folder=self.scratch_folder / "again")
             repeated = again.repeat_goldens(1, self.notify)
             digests.update(run.output_digest for run in repeated.values())
         if digests != {golden.output_digest}:
             return False  # forged, or no longer true
-        self._move_to_pending(copy / "golden", golden_run)
+        self._move_to_pending(copy / GOLDEN_FOLDER, golden_run)
         self.goldens[golden_run] = self.passed_goldens[path] = golden
         return True
 

@@ -14,6 +14,7 @@ from mutator.mutants.probe_contract import was_triggered
 from mutator.outcomes import trace_and_record_loading
 from mutator.outcomes.hazard_and_metric_judgement import load_judged_run
 from mutator.outcomes.lost_observed_values import find_value_lost_for_good
+from mutator.store.golden_files import read_golden_files
 from mutator.store.golden_verdicts import GoldenVerdict
 from mutator.targets.manifest import TargetManifest
 
@@ -83,6 +84,16 @@ def output_digest_of(manifest: TargetManifest, out: Path) -> str:
         return digest([digest(read_bounded(path_below(out, name))) for name in manifest.output_files])
     except OSError:
         return ""
+
+
+def golden_output_digest(manifest: TargetManifest, golden: Path, key: str) -> str:
+    """Like `output_digest_of`, of a run in the folder `golden`, which can be packed. MutatorError if that is
+    damaged.
+    """
+    files = read_golden_files(golden, key)
+    if not files.keys() >= {*manifest.output_files}:
+        return ""
+    return digest([digest(files[name]) for name in manifest.output_files])
 
 
 def golden_pair_problem(first: CheckRun, again: CheckRun) -> str:

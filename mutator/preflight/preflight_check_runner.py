@@ -29,6 +29,7 @@ from mutator.mutants.mutant_building import Mutant, build
 from mutator.preflight import canary_check, unreached_triggers
 from mutator.preflight.check_run_problems import CheckRun, null_mutant_problem, read_check_run
 from mutator.preflight.forked_golden_runs import ForkedGoldenRuns, runs_driven_once
+from mutator.store.golden_files import GOLDEN_FOLDER, pack_golden
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.run_progress import Progress, StagePace
 from mutator.targets.manifest import TargetManifest
@@ -280,9 +281,12 @@ class CheckRunner:
             remove_folder(scratch)
 
     def _keep_output(self, key: GoldenRun, execution: JobResult) -> None:
-        golden_folder = path_below(self.pending_folder / "golden", key.key)
-        golden_folder.parent.mkdir(parents=True, exist_ok=True)
-        execution.out.rename(golden_folder)
+        golden = self.pending_folder / GOLDEN_FOLDER
+        if self._is_of_family(key):
+            pack_golden(execution.out, golden, key.key)
+        else:
+            golden.mkdir(parents=True, exist_ok=True)
+            execution.out.rename(path_below(golden, key.key))
 
     def _keep_observations(self, key: GoldenRun, job: Job, execution: JobResult) -> None:
         unreached_triggers.save_observations(

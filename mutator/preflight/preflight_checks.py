@@ -9,7 +9,7 @@ from typing import Any
 from mutator._common import cached_folders
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below, unlink_below
-from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
+from mutator._common.files import json_bytes, raising_disk_full, read_json, remove_folder, write_atomic
 from mutator._common.hashing import as_json_types, digest
 from mutator.campaigns import run_environment
 from mutator.campaigns.bench_files import load_campaign_of_run
@@ -32,8 +32,8 @@ from mutator.preflight.check_judgements import (
 from mutator.preflight.check_run_problems import (
     CheckRun,
     equal_scenarios_problem,
+    golden_output_digest,
     golden_verdict_of,
-    output_digest_of,
 )
 from mutator.preflight.forked_golden_runs import describe_family_runs
 from mutator.preflight.preflight_check_runner import (
@@ -53,6 +53,7 @@ from mutator.store.checks_file import (
     unpackaged_modules_as_json,
 )
 from mutator.store.file_digests import FileDigest
+from mutator.store.golden_files import GOLDEN_FOLDER, copy_golden, move_golden, stored_golden
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.golden_verdicts import GOLDEN_VERDICTS_KEY
 from mutator.store.preflight_results import CheckResult
@@ -118,9 +119,11 @@ def describe_unreached_triggers(workspace: Workspace, folder: RunFolder) -> list
 
 
 def checks_and_goldens_exist(folder: RunFolder) -> bool:
-    folders = (folder.golden_folder(*golden_run) for golden_run in folder.goldens_with_files)
-    goldens = (path_below(place, name) for place in folders for name in folder.head.golden_files)
-    return all(path.is_file() for path in (folder.path / CHECKS_FILE, *goldens))
+    stored = [
+        stored_golden(folder.path / GOLDEN_FOLDER, golden_run.key) for golden_run in folder.goldens_with_files
+    ]
+    files = [path_below(run, name) for run in stored if run.is_dir() for name in folder.head.golden_files]
+    return all(map(Path.exists, stored)) and all(map(Path.is_file, (folder.path / CHECKS_FILE, *files)))
 
 
 def _pending_folder(folder: RunFolder) -> Path:
@@ -164,8 +167,8 @@ class PreflightChecks:
         """
         if (results := self._passed_results(self._stored_checks(), self.folder.path)) is not None:
             return results
-        if self.workspace.planned_scenarios is not None or self.campaign.is_fault_free:
-            return None  # to repeat the runs would cost as much, and their verdicts are results
+        if not self._can_use_cache:
+            return None
         copy = self.pending_folder
         try:
             with raising_disk_full(copy):
@@ -192,7 +195,7 @@ class PreflightChecks:
             return None
         keys = [golden_run.key for golden_run in self.folder.goldens_with_files]
         if any(
-            output_digest_of(self.manifest, path_below(folder / "golden", key)) != stored["goldens"][key]
+            golden_output_digest(self.manifest, folder / GOLDEN_FOLDER, key) != stored["goldens"][key]
             for key in keys
         ):
             return None
@@ -225,11 +228,11 @@ class PreflightChecks:
         goldens = {golden_run.key: runs[GOLDEN, golden_run].output_digest for golden_run in self.golden_runs}
         self._check_goldens_same_as_before(goldens)
         for golden_run in self.folder.goldens_with_files:
-            place = path_below(self.pending_folder / "golden", golden_run.key)
-            if goldens[golden_run.key] and output_digest_of(self.manifest, place) != goldens[golden_run.key]:
+            pending, key = self.pending_folder / GOLDEN_FOLDER, golden_run.key
+            if goldens[key] and golden_output_digest(self.manifest, pending, key) != goldens[key]:
                 raise MutatorError(
                     "a golden run was changed by a mutant, or by another program",
-                    where=place,
+                    where=stored_golden(pending, key),
                     remedy="run the same command again; `--sandbox` keeps mutants from it",
                 )
         golden_runs = [runs[GOLDEN, key] for key in self.golden_runs]
@@ -263,8 +266,17 @@ class PreflightChecks:
         verdicts = {key.key: as_json_types(golden_verdict_of(runs[GOLDEN, key])) for key in self.golden_runs}
         return {GOLDEN_VERDICTS_KEY: verdicts}
 
+    @property
+    def _can_use_cache(self) -> bool:
+        """Whether the cache saves anything. To repeat the runs of families would cost as much, and the
+        verdicts of drives without faults are results.
+        """
+        return self.workspace.planned_scenarios is None and not self.campaign.is_fault_free
+
     def store_in_cache(self) -> None:
         """Store passed checks for other run folders."""
+        if not self._can_use_cache:
+            return
         cached = preflight_cache.cached_checks_path(self.digest)
         preflight_cache.store_passed_checks(cached, self.folder.path, CHECKS_FILE, self.pending_folder)
 
@@ -276,13 +288,10 @@ class PreflightChecks:
         self._check_goldens_same_as_before({golden_run.key: output_digest})
         if golden_run not in self.folder.goldens_with_files:
             return
-        copy = self.folder.scratch_folder / "placed"
-        shutil.rmtree(copy, ignore_errors=True)
-        shutil.copytree(path_below(self.pending_folder / "golden", golden_run.key), copy)
-        place = path_below(self.folder.path / "golden", golden_run.key)
-        shutil.rmtree(place, ignore_errors=True)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        copy.rename(place)  # a killed command leaves it complete, or not there
+        golden, copy = self.folder.path / GOLDEN_FOLDER, self.folder.scratch_folder / "placed"
+        remove_folder(copy)
+        # a killed command leaves it complete, or not there
+        move_golden(copy_golden(self.pending_folder / GOLDEN_FOLDER, golden_run.key, copy), golden)
 
     def build_check_runner(self, pending_folder: Path) -> CheckRunner:
         return CheckRunner(
@@ -302,7 +311,7 @@ class PreflightChecks:
     def _store_in_run_folder(self, results: Mapping[str, Any]) -> None:
         """Store golden runs and the results of the checks, with limits that an earlier session measured."""
         checks = json_bytes({**results, **_limits_of_earlier_session(self._stored_checks())})
-        run, golden = self.folder.path, self.pending_folder / "golden"
+        run, golden = self.folder.path, self.pending_folder / GOLDEN_FOLDER
         golden.mkdir(parents=True, exist_ok=True)
         files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
         new = {
@@ -312,8 +321,8 @@ class PreflightChecks:
         with file_digests.announcing_rewrites(
             run, {**removed, **new, CHECKS_FILE: FileDigest.of_bytes(checks)}
         ):
-            shutil.rmtree(run / "golden", ignore_errors=True)
-            golden.rename(run / "golden")
+            shutil.rmtree(run / GOLDEN_FOLDER, ignore_errors=True)
+            golden.rename(run / GOLDEN_FOLDER)
             write_atomic(run / CHECKS_FILE, checks)
 
     def _stored_checks(self) -> dict[str, Any] | None:
@@ -326,7 +335,7 @@ class PreflightChecks:
         """
         run, before = self.folder.path, (self._stored_checks() or {}).get("goldens", {})
         known_digests = {
-            key: before.get(key) or output_digest_of(self.manifest, path_below(run / "golden", key))
+            key: before.get(key) or golden_output_digest(self.manifest, run / GOLDEN_FOLDER, key)
             for key in goldens
         }
         changed = [key for key in goldens if known_digests[key] not in ("", goldens[key])]

@@ -21,7 +21,7 @@ ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any
         "progress.json",
     ),
     *SIGNATURE_FILES,
-    *("golden/*/*", "patches/*.blocks"),
+    *("golden/*/*", "golden/*.packed", "patches/*.blocks"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
     "executed/*.jsonl",
     *("series/*.js", "series/*.blocks"),

@@ -37,7 +37,7 @@ _MIN_BYTES_FOR_THREADS = 20_000_000  # the least number of bytes for which threa
 SEGMENT_FOLDERS = ("records", "proof")
 _LEDGER_NAME_PATTERN = re.compile(  # what the ledger may name
     r"(run\.json|campaign\.yaml|plan\.csv|plan/(experiments|faults|batches|scenarios)\.jsonl|(checks|reviewed)\.json"
-    r"|golden/.+/.+|(records|proof)/[^/]+\.jsonl)"
+    r"|golden/(.+/.+|[^/]+\.packed)|(records|proof)/[^/]+\.jsonl)"
 )
 
 

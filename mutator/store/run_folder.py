@@ -23,6 +23,7 @@ from mutator.store import file_digests, integrity, plan_file
 from mutator.store.allowed_contents import TRACES_FOLDER
 from mutator.store.appended_files import unfinished_growth_problems
 from mutator.store.checks_file import HazardTimes, golden_hazards_of_run, limits_of_run
+from mutator.store.golden_files import GOLDEN_FOLDER, golden_output_folder
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.packed_patches import PatchFolder
 from mutator.store.plain_contents_check import check_plain_contents
@@ -222,7 +223,8 @@ class RunFolder:
         return GoldenRun.for_experiment(experiment, several_seeds=self.has_seeded_goldens)
 
     def golden_folder(self, scenario: str, changes: tuple[str, ...] = (), seed: int | None = None) -> Path:
-        return path_below(self.path / "golden", GoldenRun(scenario, changes, seed).key)
+        """Return a folder with the output of a golden run, for reading only. It is missing if the run is."""
+        return golden_output_folder(self.path / GOLDEN_FOLDER, GoldenRun(scenario, changes, seed).key)
 
     def golden_folder_of(self, experiment: Experiment) -> Path:
         return self.golden_folder(*self.golden_run_of(experiment))

@@ -15,7 +15,7 @@ from mutator.campaigns.plan_tally import plan_digest
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
-from mutator.store import file_digests
+from mutator.store import file_digests, trace_packing
 from mutator.store.file_digests import FileDigest
 from mutator.store.golden_verdicts import load_golden_verdicts
 from mutator.store.plan_choices import Choices
@@ -157,6 +157,62 @@ def forge_digests(run: Path) -> None:
     file_digests.save_ledger(run, file_digests.DigestLedger(files=files))
 
 
+def test_edits_of_a_packed_golden_run_are_found(families: Workspace, tmp_path: Path) -> None:
+    """Golden runs of families are packed. Whoever edits one needs as many forgeries as for any other, and
+    changes the seal.
+    """
+    out = tmp_path / "run"
+    run_campaign(families, "toy", out, engine="fork")
+    run = mutator.load_run(out, workspace=families)
+    seal, results_digest = run.seals.seal, run.seals.results_digest
+    packed = sorted((out / "golden").glob("*.packed"))
+    keys = {golden.key for golden in run.folder.golden_runs if golden.scenario.startswith("follow-")}
+    assert {path.stem for path in packed} == keys
+    assert {path.name for path in (out / "golden").iterdir() if path.is_dir()} == {"A", "A+alone"}
+    assert not run.golden(packed[0].stem.partition("+")[0]).empty
+    before = packed[0].read_bytes()
+
+    packed[0].write_bytes(packed[1].read_bytes())
+    assert mutator.verify(out, workspace=families).differences
+    with pytest.raises(MutatorError, match="changed: "):
+        mutator.load_run(out, workspace=families)
+    forge_digests(out)
+    found = " ".join(map(str, mutator.verify(out, workspace=families).differences))
+    assert f"golden run {packed[0].stem} with digest" in found
+    whole = (out / "checks.json").read_bytes()
+    checks = json.loads(whole)
+    checks["goldens"][packed[0].stem] = checks["goldens"][packed[1].stem]
+    (out / "checks.json").write_bytes(json_bytes(checks))
+    forge_digests(out)
+    assert mutator.verify(out, workspace=families).differences
+    assert mutator.load_run(out, workspace=families).seals.seal != seal
+
+    (out / "checks.json").write_bytes(whole)
+    packed[0].write_bytes(before[:-9] + bytes(9))
+    forge_digests(out)
+    found = " ".join(map(str, mutator.verify(out, workspace=families).differences))
+    assert "a damaged golden run" in found
+    packed[0].unlink()
+    mutator.verify(out, workspace=families, repair=True)
+    run_campaign(families, "toy", out, engine="fork")
+    assert packed[0].read_bytes() == before
+    assert mutator.load_run(out, workspace=families).seals.results_digest == results_digest
+
+
+def test_seals_do_not_depend_on_packing(
+    families: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another version of the compressor gives other bytes, but the golden runs are the same."""
+    run_campaign(families, "toy", tmp_path / "1", engine="fork")
+    monkeypatch.setattr(trace_packing, "_LZMA_PRESET", 0)
+    run_campaign(families, "toy", tmp_path / "0", engine="fork")
+    files = [{p.name: p.read_bytes() for p in (tmp_path / n / "golden").glob("*.packed")} for n in "10"]
+    assert files[0].keys() == files[1].keys()
+    assert files[0] != files[1]
+    seals = [mutator.load_run(tmp_path / name, workspace=families).seals for name in "10"]
+    assert seals[0] == seals[1]
+
+
 def test_a_bench_takes_scenarios_of_families(families: Workspace, tmp_path: Path) -> None:
     out = tmp_path / "bench"
     with mutator.open_bench(families, out, target="toycar") as bench:
@@ -164,6 +220,7 @@ def test_a_bench_takes_scenarios_of_families(families: Workspace, tmp_path: Path
         [record] = bench.run([first])
         second = bench.build_experiment("sensor/distance/longer", "follow:ego=15,gap=30,lead=18", "2")
         assert len(bench.run([first, second])) == 2
+    assert len(list((out / "golden").glob("follow-*.packed"))) == 2
     assert record.experiment_id == first.id
     assert mutator.verify(out, workspace=families).differences == ()
     with mutator.open_bench(families, out, target="toycar") as bench:

@@ -57,7 +57,7 @@ class PieceRunner:
         self._work_folder.mkdir()
         self._goldens_folder = self._work_folder / "golden"
         self._golden_cache = GoldenRunCache(bundle, inputs.manifest)
-        self._digest_by_golden_folder: dict[Path, str] = {}
+        self._digest_by_golden: dict[str, str] = {}  # by key
         self._note_golden_digests()
         self._matching_goldens: set[str] = set()  # golden runs that equal the campaign's
         self._runners: WorkerRunners | None = None  # made for the first piece
@@ -90,9 +90,8 @@ class PieceRunner:
         return self._runners
 
     def _note_golden_digests(self) -> None:
-        self._digest_by_golden_folder |= {
-            path_below(self._goldens_folder, key): golden_digest
-            for key, (_, golden_digest) in self._bundle.golden_and_digest_by_key.items()
+        self._digest_by_golden |= {
+            key: golden_digest for key, (_, golden_digest) in self._bundle.golden_and_digest_by_key.items()
         }
 
     def _make_runners(self) -> WorkerRunners:
@@ -109,7 +108,7 @@ class PieceRunner:
             golden_folder_of=lambda experiment: path_below(
                 self._goldens_folder, self._golden_of(experiment).key
             ),
-            digest_by_golden_folder=self._digest_by_golden_folder,
+            digest_by_golden=self._digest_by_golden,
             has_seeded_goldens=bundle.meta["several_seeds"],
             scenario_file=bundle.scenario_path,
             with_series=bundle.meta["series"],

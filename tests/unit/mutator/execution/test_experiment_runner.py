@@ -34,6 +34,7 @@ from mutator.model import (
 from mutator.mutants.mutant_building import build
 from mutator.outcomes import trace_files
 from mutator.preflight.check_run_problems import output_digest_of
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_choices import Choices
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
@@ -286,7 +287,9 @@ def test_nothing_is_compared_with_a_changed_golden_run(
     experiment = build_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
     place = tmp_path / "golden" / "A"
     write_golden(place)
-    digests = {place: output_digest_of(manifest, place)}
+    digests = {
+        GoldenRun.for_experiment(experiment, several_seeds=False).key: output_digest_of(manifest, place)
+    }
     said: Outputs = {"said": {"hazards": {}, "alert_events": []}, "trace": {"gas": np.zeros(20)}, "ran": RAN}
 
     class Changing(PlayedEngine):
