@@ -10,6 +10,7 @@ from mutator.families import family_yaml
 from mutator.faults import fault_specs
 from mutator.faults.library_readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.library_readings import ReadingsModel
+from mutator.reference.family_drives import COLOUR_NAMES, drawn_scenarios
 from mutator.reference.yaml_key_tables import generated_page_head, model_sections
 from mutator.stpa import accidents_and_hazards, context_tables, hazard_analysis_yaml
 from mutator.targets import manifest_files, severity_yaml
@@ -95,7 +96,8 @@ def render_families_page(workspace: Workspace) -> str:
         "of `random` and `sobol` are the same for each `sample`.\n",
         "## The families of this library\n",
         "[What the controller does without faults](../explanation/fault-free-drives.md) shows how they are "
-        "driven.\n",
+        "driven.\nEach drawing shows three drives without faults: the speeds of the car and of its lead "
+        "(dashed), and the gap between them.\n",
         *_families_of_library(workspace),
     )
 
@@ -105,6 +107,9 @@ def _families_of_library(workspace: Workspace) -> Iterator[str]:
         family = workspace.family(name)
         yield f"### {name}\n"
         yield f"{family.title}. Source: {family.source}\n"
+        drawn = zip(COLOUR_NAMES, drawn_scenarios(family), strict=True)
+        labels = "; ".join(f"{colour}: {scenario.label}" for colour, scenario in drawn)
+        yield f"![{family.title}](families/{name}.svg)\n\n{labels}.\n"
         rows = [(parameter.name, parameter.describe_values()) for parameter in family.parameters]
         rows += [("with", f"`{constraint}`") for constraint in family.constraints]
         yield TextTable(heads=("parameter", "values"), rows=rows).as_markdown(escape=False)
