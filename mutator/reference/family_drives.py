@@ -20,6 +20,7 @@ from mutator.limits import Limits
 from mutator.model import ConcreteScenario, Status
 from mutator.outcomes.trace_and_record_loading import Trace, load_trace
 from mutator.store.planned_scenarios import PlannedScenarios
+from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -27,10 +28,10 @@ DRAWINGS_FOLDER = Path("docs") / "reference" / "families"
 COLOURS = ("#1b6ca8", "#c4531a", "#3f7d20")
 COLOUR_NAMES = ("blue", "orange", "green")
 _SEED = 0
-_M_PER_S_TO_KM_PER_H = 3.6
 _MOST_POINTS = 100  # of a curve
-_WIDTH, _HEIGHT, _LEFT, _TOP, _BOTTOM = 300, 150, 38, 22, 20  # of a panel and its margins, in pixels
-_SPEED_CHANNELS = (("v_ego", ""), ("v_lead", ' stroke-dasharray="3 3"'))
+_WIDTH, _HEIGHT = 300, 150  # of a panel, in pixels
+_AXIS_X, _AXIS_END_X, _AXIS_TOP, _AXIS_BOTTOM = 38, 292, 22, 130  # of the axes in it
+_DASHES = ("", ' stroke-dasharray="3 3"')  # of the curves in a panel
 _Curve = tuple[str, np.ndarray, np.ndarray]  # SVG attributes, times (s), values
 
 
@@ -51,7 +52,7 @@ def render_drawings(workspace: Workspace, scratch: Path) -> Iterator[tuple[str, 
         for scenario in drawn_scenarios(workspace.family(name)):
             planned.add(scenario)
             traces.append(_drive(engine, manifest, planned.file(scenario.name)))
-        yield f"{name}.svg", _drawing_svg(name, traces)
+        yield f"{name}.svg", _drawing_svg(name, manifest, traces)
 
 
 def _drive(engine: ReferenceEngine, manifest: TargetManifest, scenario: Path) -> Trace:
@@ -62,26 +63,34 @@ def _drive(engine: ReferenceEngine, manifest: TargetManifest, scenario: Path) ->
     return load_trace(manifest, result.out)
 
 
-def _drawing_svg(name: str, traces: Sequence[Trace]) -> str:
-    """Return two panels: the speeds of both cars, and the gap between them, over time."""
-    speeds: list[_Curve] = [
-        (f'stroke="{colour}"{dashes}', trace["t"], trace[channel] * _M_PER_S_TO_KM_PER_H)
-        for colour, trace in zip(COLOURS, traces, strict=True)
-        for channel, dashes in _SPEED_CHANNELS
+def _drawing_svg(name: str, manifest: TargetManifest, traces: Sequence[Trace]) -> str:
+    """Return a panel for each unit of the observed values that are recorded, over time."""
+    observed = {value.name for value in manifest.observation.values}
+    channels_by_unit: dict[str, list[Channel]] = {}
+    for channel in manifest.channels:
+        if channel.name in observed:
+            channels_by_unit.setdefault(channel.unit, []).append(channel)
+    width = _WIDTH * len(channels_by_unit)
+    panels = [
+        line
+        for number, (unit, channels) in enumerate(channels_by_unit.items())
+        for line in _panel(
+            f"{'; dashed: '.join(channel.about for channel in channels)}, {unit}",
+            [
+                (f'stroke="{colour}"{dashes}', trace[manifest.time_channel], trace[channel.name])
+                for colour, trace in zip(COLOURS, traces, strict=True)
+                for channel, dashes in zip(channels, _DASHES, strict=False)
+            ],
+            number * _WIDTH,
+        )
     ]
-    gaps: list[_Curve] = [
-        (f'stroke="{colour}"', trace["t"], trace["d_rel"])
-        for colour, trace in zip(COLOURS, traces, strict=True)
-    ]
-    title = f"Speeds and gap over time in three drives of {name}"
     return "\n".join(
         (
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{2 * _WIDTH}" height="{_HEIGHT}" '
-            f'viewBox="0 0 {2 * _WIDTH} {_HEIGHT}" role="img" font-family="sans-serif" font-size="10">',
-            f"<title>{title}</title>",
-            f'<rect width="{2 * _WIDTH}" height="{_HEIGHT}" fill="#fff"/>',
-            *_panel("speed, km/h (lead: dashed)", speeds, 0),
-            *_panel("gap, m", gaps, _WIDTH),
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{_HEIGHT}" '
+            f'viewBox="0 0 {width} {_HEIGHT}" role="img" font-family="sans-serif" font-size="10">',
+            f"<title>What is observed over time in three drives of {name}</title>",
+            f'<rect width="{width}" height="{_HEIGHT}" fill="#fff"/>',
+            *panels,
             "</svg>\n",
         )
     )
@@ -91,8 +100,8 @@ def _panel(title: str, curves: Sequence[_Curve], x: int) -> Iterator[str]:
     finite = np.concatenate([values[np.isfinite(values)] for _, _, values in curves])
     end_s = max(float(times[-1]) for _, times, _ in curves)
     low, high = min(0.0, float(finite.min())), max(float(finite.max()), 1.0)
-    width, height = _WIDTH - _LEFT - 8, _HEIGHT - _TOP - _BOTTOM
-    yield f'<g transform="translate({x + _LEFT} {_TOP})">'
+    width, height = _AXIS_END_X - _AXIS_X, _AXIS_BOTTOM - _AXIS_TOP
+    yield f'<g transform="translate({x + _AXIS_X} {_AXIS_TOP})">'
     yield f'<text x="0" y="-8">{title}</text>'
     yield f'<path d="M0 0V{height}H{width}" fill="none" stroke="#767676"/>'
     for value, y in ((high, 0), (low, height)):

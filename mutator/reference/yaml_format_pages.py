@@ -96,8 +96,7 @@ def render_families_page(workspace: Workspace) -> str:
         "of `random` and `sobol` are the same for each `sample`.\n",
         "## The families of this library\n",
         "[What the controller does without faults](../explanation/fault-free-drives.md) shows how they are "
-        "driven.\nEach drawing shows three drives without faults: the speeds of the car and of its lead "
-        "(dashed), and the gap between them.\n",
+        "driven.\nEach drawing shows what is observed in three drives without faults, over time.\n",
         *_families_of_library(workspace),
     )
 
