@@ -71,16 +71,12 @@ def open_bench(
     check_whole_number("workers", workers, least=1)
     check_engine_is_offered(engine)
     opened_workspace = open_workspace(workspace)
-    values = _values_of_campaign(opened_workspace, campaign)
-    selected_target = SelectedTarget.of(opened_workspace, target or values.pop("target", None))
+    selected_target, values = bench_values(
+        opened_workspace, target=target, campaign=campaign, reading=reading, seed=seed
+    )
     arguments = {"canary": canary, "limits": limits, "include": include}
     values |= {name: value for name, value in arguments.items() if value is not None}
-    values |= {
-        "target": selected_target.manifest.name,
-        "reading": _checked_reading(opened_workspace, reading),
-        "seed": seed,
-        "after_hazard": checked_after_hazard(after_hazard).value,
-    }
+    values |= {"after_hazard": checked_after_hazard(after_hazard).value}
     with (
         opened_bench(
             opened_workspace,
@@ -89,7 +85,7 @@ def open_bench(
             workers=workers,
             engine=engine,
             reuse=reuse,
-            distributor=_distributor_of_cluster(cluster, insecure_network=insecure_network),
+            distributor=distributor_of_cluster(cluster, insecure_network=insecure_network),
         ) as opened,
         finishing(opened),
     ):
@@ -185,7 +181,7 @@ class Bench:
         return Run(RunFolder.open(self.path), self._selected_target.workspace)
 
 
-def _distributor_of_cluster(cluster: str | None, *, insecure_network: bool) -> Distributor | None:
+def distributor_of_cluster(cluster: str | None, *, insecure_network: bool) -> Distributor | None:
     """Return what deals to the cluster; None without one, as the bench's own workers then do the work."""
     distributor = choose_distributor(cluster, insecure=insecure_network)
     return distributor if cluster is not None else None
@@ -200,6 +196,16 @@ def _warn_of_end(summary: Summary | None) -> None:
         warnings.warn(text, MutatorWarning, stacklevel=4)
     else:
         warnings.warn(describe_unfinished(summary), IncompleteRun, stacklevel=4)
+
+
+def bench_values(
+    workspace: Workspace, *, target: str | None, campaign: str | Path | None, reading: str | None, seed: int
+) -> tuple[SelectedTarget, dict[str, Any]]:
+    """Return the target of a new bench, and the values of its file, as far as these arguments give them."""
+    values = _values_of_campaign(workspace, campaign)
+    selected_target = SelectedTarget.of(workspace, target or values.pop("target", None))
+    values["target"] = selected_target.manifest.name
+    return selected_target, {**values, "reading": _checked_reading(workspace, reading), "seed": seed}
 
 
 def _checked_reading(workspace: Workspace, reading: str | None) -> str:

@@ -13,6 +13,7 @@ from mutator._common.confined_files import checked_name_not_path
 from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.campaigns.campaign_model import Canary
 from mutator.campaigns.campaign_triggers import EVERY_READING
+from mutator.campaigns.exploration_section import ExplorationSection
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.errors import MutatorError
 from mutator.limits import Limits
@@ -38,6 +39,9 @@ class BenchModel(StrictModel, title="The file"):
     include: Literal["hazard_without_fault"] | None = Field(None, description="As in a campaign.")
     canary: YamlRecord[Canary] | None = Field(None, description="As in a campaign.")
     limits: YamlRecord[Limits] = Field(Limits(), description="As in a campaign.")
+    explore: YamlRecord[ExplorationSection] | None = Field(
+        None, description="What is explored; without it, others decide what comes in each batch."
+    )
 
 
 def bench_file_bytes(values: Mapping[str, Any]) -> bytes:
@@ -107,6 +111,7 @@ def load_bench_file(path: Path) -> Campaign:
         yaml_source=source,
         include=GoldenClass(model.include) if model.include else None,
         is_bench=True,
+        exploration=model.explore,
     )
 
 

@@ -17,6 +17,7 @@ from mutator.campaigns.campaign_triggers import (
     with_trigger_list_under_key,
 )
 from mutator.campaigns.expectations import Expectation
+from mutator.campaigns.exploration_section import ExplorationSection
 from mutator.campaigns.installed_studies import CheckableStudy, load_installed_study
 from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.config.yaml_files import load_yaml_model
@@ -87,6 +88,7 @@ class Campaign:
     expectation: Expectation | None = None  # what results may be under pytest; None: anything
     include: GoldenClass | None = None  # scenarios that run although their golden run has a hazard
     is_bench: bool = False  # what a bench fixed when it was opened; its experiments come in batches
+    exploration: ExplorationSection | None = None  # what a bench explores; None if others decide
 
     @property
     def seed(self) -> int:

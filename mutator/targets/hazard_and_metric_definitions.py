@@ -10,6 +10,8 @@ from mutator.triggers.conditions import GOLDEN_PREFIX
 Aggregate = Literal["min", "max", "mean", "last", "integral", "duration", "at_end", "at_hazard"]
 WorseDirection = Literal["higher", "lower"]
 
+MARGIN_PREFIX = "margin_"  # of the metric with the smallest margin of a hazard
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:
@@ -72,7 +74,7 @@ class Hazard:
         if not (self.margin or self.required_stl):
             return None
         return Metric(
-            name=f"margin_{self.name.lower()}",
+            name=f"{MARGIN_PREFIX}{self.name.lower()}",
             aggregate="min",
             step_formula=self.margin,
             unit=self.unit,

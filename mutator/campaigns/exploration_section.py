@@ -1,0 +1,84 @@
+"""What an exploration drives, as the file of its bench fixes it."""
+
+from dataclasses import dataclass, field
+
+from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
+from mutator.config.yaml_files import YamlRecord
+from mutator.limits import MOST_LIMIT_OR_TIME
+
+MOST_PLANES = 10_000
+_MOST_POINTS = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExploredPlane:
+    """Faults of one kind in one scenario, from one time on: their magnitude and duration differ."""
+
+    __pydantic_config__ = pydantic_mapping_config("A plane")
+
+    spec: str = field(
+        metadata=yaml_metadata("The full name of a variant, `<module>/<fault_type>/<variant>`.")
+    )
+    scenario: str = field(
+        metadata=yaml_metadata(
+            "A scenario's name, or a family with values: `r157_deceleration:ego=60,gap=20`."
+        )
+    )
+    start: str = field(
+        metadata=yaml_metadata(
+            "When the fault begins, as it was asked for: a time in s, or a context's name."
+        )
+    )
+    condition: str = field(
+        metadata=yaml_metadata(
+            "The same as a condition over observed values. The fault begins when the golden run first meets it."
+        )
+    )
+    armed_after_s: float = field(
+        default=0.0,
+        metadata=yaml_metadata("From when the condition counts, in s.", ge=0, le=MOST_LIMIT_OR_TIME),
+    )
+    magnitudes: list[float] = field(
+        metadata=yaml_metadata(
+            "The values of the fault, in the unit of its spec, by their size. Empty for a fault without a value.",
+            max_length=_MOST_POINTS,
+        )
+    )
+    durations_s: list[float] = field(
+        metadata=yaml_metadata("How long the fault lasts, ascending.", min_length=1, max_length=_MOST_POINTS)
+    )
+    seed: int = field(default=0, metadata=yaml_metadata("The seed of the runs.", ge=0, lt=2**63))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExplorationSection:
+    """What an exploration drives: planes, and how far each is searched."""
+
+    __pydantic_config__ = pydantic_mapping_config("An exploration")
+
+    planes: list[YamlRecord[ExploredPlane]] = field(
+        metadata=yaml_metadata("The planes.", min_length=1, max_length=MOST_PLANES)
+    )
+    observe_s: float = field(
+        default=15.0,
+        metadata=yaml_metadata(
+            "How long a drive must go on after a fault to count as without hazard, in s.",
+            ge=0,
+            le=MOST_LIMIT_OR_TIME,
+        ),
+    )
+    search: int = field(
+        default=120, metadata=yaml_metadata("The most runs of the search of a plane.", ge=1, le=100_000)
+    )
+    validation: int = field(
+        default=86,
+        metadata=yaml_metadata(
+            "How many cells of each plane are drawn from those that the search calls without hazard, and driven. "
+            "0: none.",
+            ge=0,
+            le=100_000,
+        ),
+    )
+    batch: int = field(
+        default=16, metadata=yaml_metadata("The most experiments of a batch.", ge=1, le=10_000)
+    )

@@ -1,0 +1,1 @@
+"""Explorations: how large and how long a fault may be before a hazard follows."""

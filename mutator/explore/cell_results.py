@@ -1,0 +1,105 @@
+"""What a run says about its cell, and about the cells of longer faults."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from mutator.model import Outcome, Record, Status
+from mutator.targets.hazard_and_metric_definitions import MARGIN_PREFIX
+
+_RUNS_THAT_EQUAL_GOLDEN = (Outcome.NOT_ACTIVATED, Outcome.MASKED)
+
+
+class CellState(StrEnum):
+    """What is said of a cell."""
+
+    HAZARDOUS = "hazardous"  # driven: a hazard followed
+    WITHOUT_HAZARD = "without_hazard"  # driven: no hazard within the window
+    NOT_DECIDED = "not_decided"  # driven, but neither can be said
+    INFERRED = "inferred"  # not driven: a shorter fault reached a hazard while it was active
+    BETWEEN_HAZARDOUS = "between_hazardous"  # not driven, between hazardous cells
+    BETWEEN_WITHOUT = "between_without"  # not driven, between cells without hazard
+    UNKNOWN = "unknown"  # not driven, and its neighbours differ
+
+    @property
+    def is_hazardous(self) -> bool:
+        return self in (CellState.HAZARDOUS, CellState.INFERRED, CellState.BETWEEN_HAZARDOUS)
+
+    @property
+    def is_without_hazard(self) -> bool:
+        return self in (CellState.WITHOUT_HAZARD, CellState.BETWEEN_WITHOUT)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """The drive in which faults start: times in s. `step_s` is the target's."""
+
+    start_s: float
+    end_s: float
+    step_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CellResult:
+    """The result of a driven cell.
+
+    * `hazard`, `time_to_hazard_s`: the first hazard, and its time after the start of the fault; None without
+    * `inferred_from_s`: the shortest duration for which the hazard follows from this run; None if it came
+      after the end of the fault, which may then have caused it
+    * `margins`: the smallest distance from each hazard that has a margin, by metric
+    * `reason`: why the cell is not decided
+    """
+
+    state: CellState
+    experiment_id: str
+    hazard: str = ""
+    time_to_hazard_s: float | None = None
+    inferred_from_s: float | None = None
+    margins: Mapping[str, float] = field(default_factory=dict)
+    reason: str = ""
+
+
+def judge_cell(record: Record, duration_s: float, drive: Drive, observe_s: float) -> CellResult:
+    """Judge the run of a fault that began at `drive.start_s` and lasted `duration_s`.
+
+    Without a hazard, the drive must have gone on for `observe_s` after the fault, unless the run never left
+    the golden run.
+    """
+    margins = {name: value for name, value in record.metrics if name.startswith(MARGIN_PREFIX)}
+    name = record.experiment_id
+    if record.status is not Status.OK or record.outcome is Outcome.NOT_JUDGED:
+        reason = record.detail or f"the run ended as {record.status}"
+        return CellResult(state=CellState.NOT_DECIDED, experiment_id=name, reason=reason)
+    if record.outcome is Outcome.HAZARD:
+        hazard, time = record.hazards[0]
+        return _hazardous_cell(name, hazard, time - drive.start_s, duration_s, drive.step_s, margins)
+    observed_s = drive.end_s - drive.start_s - duration_s
+    if record.outcome in _RUNS_THAT_EQUAL_GOLDEN or observed_s >= observe_s - drive.step_s / 2:
+        return CellResult(state=CellState.WITHOUT_HAZARD, experiment_id=name, margins=margins)
+    return CellResult(
+        state=CellState.NOT_DECIDED,
+        experiment_id=name,
+        margins=margins,
+        reason=f"the drive ends {max(observed_s, 0.0):.2f} s after the fault",
+    )
+
+
+def _hazardous_cell(
+    name: str,
+    hazard: str,
+    time_to_hazard_s: float,
+    duration_s: float,
+    step_s: float,
+    margins: Mapping[str, float],
+) -> CellResult:
+    # Up to the hazard, a longer fault does the same. Two steps more, because the fault's last step acts on
+    # the truth of the step after it.
+    needed_s = round(time_to_hazard_s + 2 * step_s, 9)
+    return CellResult(
+        state=CellState.HAZARDOUS,
+        experiment_id=name,
+        hazard=hazard,
+        time_to_hazard_s=round(time_to_hazard_s, 9),
+        inferred_from_s=needed_s if needed_s <= duration_s else None,
+        margins=margins,
+    )

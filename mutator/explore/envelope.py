@@ -1,0 +1,200 @@
+"""Envelopes: what a finished exploration says of each plane."""
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from mutator.campaigns.exploration_section import ExploredPlane
+from mutator.explore.cell_results import CellResult, CellState, Drive
+from mutator.explore.lattice import Cell
+from mutator.explore.plane_exploration import PlaneExploration, Validation
+from mutator.explore.plane_map import Line
+
+CODE_BY_STATE = {
+    CellState.HAZARDOUS: "H",
+    CellState.WITHOUT_HAZARD: "o",
+    CellState.NOT_DECIDED: "?",
+    CellState.INFERRED: "h",
+    CellState.BETWEEN_HAZARDOUS: "+",
+    CellState.BETWEEN_WITHOUT: ".",
+    CellState.UNKNOWN: " ",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoundaryPair:
+    """Neighbours on a line of a plane, the longest duration that is survived and the next one. Each has the
+    experiment that shows it, which for an inferred hazard is a shorter one.
+    """
+
+    without_hazard: CellResult
+    hazardous: CellResult
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """What faults of one kind do in one scenario from one start on, by magnitude and duration."""
+
+    exploration: PlaneExploration
+
+    @property
+    def plane(self) -> ExploredPlane:
+        return self.exploration.plane
+
+    @property
+    def drive(self) -> Drive:
+        return self.exploration.drive
+
+    @property
+    def durations_s(self) -> tuple[float, ...]:
+        return self.exploration.map.lattice.durations_s
+
+    @property
+    def magnitudes(self) -> tuple[float | None, ...]:
+        """The magnitudes; None for a fault without a value."""
+        return self.exploration.map.lattice.magnitudes
+
+    @cached_property
+    def cells(self) -> list[Line]:
+        """The state of each cell, by magnitude and duration."""
+        return self.exploration.cells()
+
+    @property
+    def run_count(self) -> int:
+        """The number of cells that were driven."""
+        return len(self.exploration.map.results)
+
+    @property
+    def validation(self) -> Validation | None:
+        """The newest validation; None without one."""
+        return self.exploration.validations[-1] if self.exploration.validations else None
+
+    def state_at(self, magnitude: float | None, duration_s: float) -> CellState:
+        """Return the state of the cell that is at least as large and long as this fault; unknown if it is
+        larger or longer than any.
+        """
+        line = _first_at_least(self.magnitudes, magnitude)
+        duration = _first_at_least(self.durations_s, duration_s)
+        return CellState.UNKNOWN if line is None or duration is None else self.cells[line][duration]
+
+    def longest_survived_s(self, line: int) -> float | None:
+        """Return the longest duration up to which all of a line are without hazard; None if the shortest is
+        not.
+        """
+        count = next(
+            (j for j, state in enumerate(self.cells[line]) if not state.is_without_hazard),
+            len(self.cells[line]),
+        )
+        return self.durations_s[count - 1] if count else None
+
+    def shortest_hazardous_s(self, line: int) -> float | None:
+        """Return the shortest duration of a line that is hazardous; None without one."""
+        return next(
+            (d for d, state in zip(self.durations_s, self.cells[line], strict=True) if state.is_hazardous),
+            None,
+        )
+
+    def largest_survived(self, duration_s: float | None = None) -> float | None:
+        """Return the magnitude up to which all are survived for this duration, by default for every duration
+        that leaves time to observe what follows; None if the smallest is not.
+        """
+        last = (
+            self.exploration.decidable - 1
+            if duration_s is None
+            else _last_at_most(self.durations_s, duration_s)
+        )
+        if last is None:
+            return None
+        columns = range(last + 1) if duration_s is None else (last,)
+        survived = None
+        for magnitude, line in zip(self.magnitudes, self.cells, strict=True):
+            if not all(line[j].is_without_hazard for j in columns):
+                break
+            survived = magnitude
+        return survived
+
+    def time_to_hazard_s(self, line: int) -> float | None:
+        """Return the time to the hazard of the longest fault of a line that was driven to one."""
+        results = self.exploration.map.results
+        driven = (results.get((line, j)) for j in reversed(range(len(self.durations_s))))
+        return next((r.time_to_hazard_s for r in driven if r and r.state is CellState.HAZARDOUS), None)
+
+    def boundary_pair(self, line: int) -> BoundaryPair | None:
+        """Return the boundary of a line, if both sides of it are driven or inferred."""
+        for j, state in enumerate(self.cells[line][:-1]):
+            after = self.cells[line][j + 1]
+            if state is CellState.WITHOUT_HAZARD and after in (CellState.HAZARDOUS, CellState.INFERRED):
+                before_result = self.exploration.map.results[line, j]
+                proof = self.exploration.map.proof_of((line, j + 1))
+                assert proof is not None
+                return BoundaryPair(without_hazard=before_result, hazardous=proof)
+        return None
+
+    def islands(self) -> list[list[Cell]]:
+        """Return the groups of hazardous cells that are not connected with the largest group."""
+        hazardous = {
+            (i, j) for i, line in enumerate(self.cells) for j, s in enumerate(line) if s.is_hazardous
+        }
+        groups = sorted(_connected_groups(hazardous), key=lambda group: (-len(group), group[0]))
+        return groups[1:]
+
+    def as_json(self) -> dict[str, Any]:
+        """Convert to JSON types. A cell is a letter (`CODE_BY_STATE`); a line has one for each duration."""
+        return {
+            "spec": self.plane.spec,
+            "scenario": self.plane.scenario,
+            "start": self.plane.start,
+            "start_s": self.drive.start_s,
+            "end_s": self.drive.end_s,
+            "seed": self.plane.seed,
+            "magnitudes": list(self.plane.magnitudes),
+            "durations_s": list(self.durations_s),
+            "cells": ["".join(CODE_BY_STATE[state] for state in line) for line in self.cells],
+            "runs": self.run_count,
+            "longest_survived_s": [self.longest_survived_s(i) for i in range(len(self.magnitudes))],
+            "time_to_hazard_s": [self.time_to_hazard_s(i) for i in range(len(self.magnitudes))],
+            "pairs": [_pair_as_json(self.boundary_pair(i)) for i in range(len(self.magnitudes))],
+            "validations": [
+                {
+                    "frame": validation.frame_size,
+                    "drawn": [list(cell) for cell in validation.drawn],
+                    "hazardous": [list(cell) for cell in self.exploration.failures(validation)],
+                }
+                for validation in self.exploration.validations
+            ],
+        }
+
+
+def _pair_as_json(pair: BoundaryPair | None) -> Mapping[str, Any] | None:
+    if pair is None:
+        return None
+    return {"without_hazard": pair.without_hazard.experiment_id, "hazardous": pair.hazardous.experiment_id}
+
+
+def _first_at_least(values: Sequence[float | None], value: float | None) -> int | None:
+    if value is None:
+        return 0
+    return next((i for i, other in enumerate(values) if other is None or abs(other) >= abs(value)), None)
+
+
+def _last_at_most(values: Sequence[float], value: float) -> int | None:
+    return next((i for i in reversed(range(len(values))) if values[i] <= value), None)
+
+
+def _connected_groups(cells: set[Cell]) -> Iterator[list[Cell]]:
+    """Yield groups of cells that touch each other, also at corners."""
+    left = set(cells)
+    for start in sorted(cells):
+        if start not in left:
+            continue
+        left.discard(start)
+        group, queue = [start], deque([start])
+        while queue:
+            i, j = queue.popleft()
+            beside = {(i + a, j + b) for a in (-1, 0, 1) for b in (-1, 0, 1)} & left
+            left -= beside
+            group += sorted(beside)
+            queue += sorted(beside)
+        yield sorted(group)

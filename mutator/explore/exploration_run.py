@@ -1,0 +1,98 @@
+"""Runs an exploration on a bench."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Protocol
+
+from mutator.campaigns.exploration_section import ExplorationSection, ExploredPlane
+from mutator.errors import MutatorError
+from mutator.execution.bench import Bench
+from mutator.explore.cell_results import Drive
+from mutator.explore.exploration import BatchLoop, Exploration, Proposal
+from mutator.explore.golden_drives import drive_of, load_golden_trace
+from mutator.model import Experiment, Record, Status
+from mutator.store.golden_runs import GoldenRun
+from mutator.targets.manifest import TargetManifest
+
+
+class BuildExperiment(Protocol):
+    """Builds the experiment of a cell: a fault of this magnitude, from `start_s` on for `duration_s`."""
+
+    def __call__(
+        self, plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float
+    ) -> Experiment: ...
+
+
+def run_exploration(
+    bench: Bench,
+    manifest: TargetManifest,
+    section: ExplorationSection,
+    seed: int,
+    build: BuildExperiment,
+    may_begin: Callable[[], bool] = lambda: True,
+) -> Exploration:
+    """Run an exploration, or go on with it, until nothing is proposed or `may_begin` says no.
+
+    MutatorError if a fault never starts, or if the harness failed in an experiment.
+    """
+    drives = _find_drives(bench, manifest, section, build)
+    exploration = Exploration(section=section, drives=drives, seed=seed)
+    run = _BenchRun(bench, exploration, build)
+    BatchLoop(exploration=exploration, begin=run.begin, finish=run.finish, may_begin=may_begin).run()
+    return exploration
+
+
+def _find_drives(
+    bench: Bench, manifest: TargetManifest, section: ExplorationSection, build: BuildExperiment
+) -> list[Drive]:
+    # the golden run does not depend on magnitude, start and duration
+    samples = [build(p, (*p.magnitudes, None)[0], 0.0, p.durations_s[0]) for p in section.planes]
+    folders = bench.checked_golden_folders(samples)
+    golden_runs = [GoldenRun.for_experiment(sample, several_seeds=True) for sample in samples]
+    traces = {golden: load_golden_trace(manifest, folder) for golden, folder in folders.items()}
+    return [
+        drive_of(manifest, traces[golden], plane)
+        for golden, plane in zip(golden_runs, section.planes, strict=True)
+    ]
+
+
+class _BenchRun:
+    """Begins and finishes the batches of an exploration on a bench."""
+
+    def __init__(self, bench: Bench, exploration: Exploration, build: BuildExperiment) -> None:
+        self._bench, self._exploration, self._build = bench, exploration, build
+        self._experiment_ids: dict[Proposal, str] = {}
+        self._records: dict[str, Record] = {}
+
+    def begin(self, number: int, batch: Sequence[Proposal]) -> None:
+        experiments = [self._build_experiment(proposal) for proposal in batch]
+        self._experiment_ids |= {p: e.id for p, e in zip(batch, experiments, strict=True)}
+        self._bench.submit(experiments, f"exploration, batch {number}")
+
+    def finish(self, batch: Sequence[Proposal]) -> Iterable[Record]:
+        experiment_ids = [self._experiment_ids[proposal] for proposal in batch]
+        missing = set(experiment_ids) - self._records.keys()
+        results = self._bench.results()
+        while missing:
+            record = next(results)
+            self._records[record.experiment_id] = record
+            missing.discard(record.experiment_id)
+        for experiment_id in experiment_ids:
+            _check_harness(self._records[experiment_id])
+        return [self._records[experiment_id] for experiment_id in experiment_ids]
+
+    def _build_experiment(self, proposal: Proposal) -> Experiment:
+        plane = self._exploration.planes[proposal.plane]
+        line, duration = proposal.cell
+        lattice = plane.map.lattice
+        return self._build(
+            plane.plane, lattice.magnitudes[line], plane.drive.start_s, lattice.durations_s[duration]
+        )
+
+
+def _check_harness(record: Record) -> None:
+    """Raise MutatorError for a harness error, from which nothing may be learned."""
+    if record.status is Status.HARNESS_ERROR:
+        raise MutatorError(
+            f"harness error in experiment {record.experiment_id}: {record.detail}",
+            remedy="run the same command again: what has finished is not repeated",
+        )

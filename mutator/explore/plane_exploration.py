@@ -1,0 +1,108 @@
+"""The exploration of one plane: search, validation, and repair of what a validation contradicts."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from mutator._common.random_streams import random_generator
+from mutator.campaigns.exploration_section import ExplorationSection, ExploredPlane
+from mutator.explore.cell_results import CellResult, CellState, Drive
+from mutator.explore.lattice import Cell, Lattice
+from mutator.explore.plane_map import Line, PlaneMap
+from mutator.explore.plane_search import PlaneSearch, cells_with
+
+MOST_VALIDATIONS = 4  # the first, and one after each of at most three repairs
+_REPAIR_RUNS = 16  # for the line of a cell that a validation finds hazardous
+_CALLED_WITHOUT_HAZARD = (CellState.BETWEEN_WITHOUT,)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Validation:
+    """Cells drawn, without replacement, from the `frame_size` undriven ones that are called without hazard."""
+
+    frame_size: int
+    drawn: tuple[Cell, ...]
+
+
+@dataclass(slots=True)
+class PlaneExploration:
+    """What is driven next in a plane, which depends on its results so far alone.
+
+    `seed` and `number`, the plane's in its exploration, decide what validations draw.
+    """
+
+    plane: ExploredPlane
+    drive: Drive
+    section: ExplorationSection
+    seed: int
+    number: int
+    map: PlaneMap = field(init=False)
+    validations: list[Validation] = field(default_factory=list)
+    _awaited: set[Cell] = field(default_factory=set)
+    _repaired_lines: set[int] = field(default_factory=set)
+    _search_runs: int = 0
+    _is_searching: bool = True
+
+    def __post_init__(self) -> None:
+        magnitudes = tuple(self.plane.magnitudes) or (None,)
+        self.map = PlaneMap(Lattice(magnitudes=magnitudes, durations_s=tuple(self.plane.durations_s)))
+
+    @property
+    def decidable(self) -> int:
+        """How many durations, at least one, leave time to observe what follows."""
+        last_s = self.drive.end_s - self.drive.start_s - self.section.observe_s + self.drive.step_s / 2
+        return max(1, sum(duration <= last_s for duration in self.map.lattice.durations_s))
+
+    def cells(self) -> list[Line]:
+        """Return the state of every cell, by magnitude and duration."""
+        return self.map.cells(self._search().closed_lines())
+
+    def failures(self, validation: Validation) -> list[Cell]:
+        """Return the drawn cells in which a hazard followed."""
+        return [cell for cell in validation.drawn if self.map.state(cell) is CellState.HAZARDOUS]
+
+    def propose(self, most: int) -> list[Cell]:
+        """Return at most `most` cells to drive next; none while results are awaited, and at the end."""
+        cells = self._next_cells()[:most]
+        self._awaited |= set(cells)
+        self._search_runs += len(cells) if self._is_searching else 0
+        return cells
+
+    def note(self, cell: Cell, result: CellResult) -> None:
+        """Take the result of a proposed cell."""
+        self._awaited.discard(cell)
+        self.map.add(cell, result)
+
+    def _search(self) -> PlaneSearch:
+        return PlaneSearch(
+            plane=self.map, decidable=self.decidable, repaired_lines=frozenset(self._repaired_lines)
+        )
+
+    def _next_cells(self) -> list[Cell]:
+        if self._is_searching:
+            if cells := self._next_in_search():
+                return cells
+            if self._awaited or not self.section.validation:
+                return []
+            self._begin_validation()
+        undriven = self._not_proposed(self.validations[-1].drawn)
+        failed = {line for line, _ in self.failures(self.validations[-1])}
+        if undriven or self._awaited or not failed or len(self.validations) == MOST_VALIDATIONS:
+            return undriven
+        self._repaired_lines |= failed
+        self._is_searching = True
+        return self._next_cells()
+
+    def _next_in_search(self) -> list[Cell]:
+        budget = self.section.search + _REPAIR_RUNS * len(self._repaired_lines) - self._search_runs
+        return self._not_proposed(self._search().proposals())[: max(0, budget)]
+
+    def _begin_validation(self) -> None:
+        frame = list(cells_with(_CALLED_WITHOUT_HAZARD, self.cells()))
+        key = f"explore/{self.number}/validation {len(self.validations) + 1}"
+        order = random_generator(self.seed, key).permutation(len(frame))[: self.section.validation]
+        drawn = tuple(frame[int(i)] for i in sorted(order))
+        self._is_searching = False
+        self.validations.append(Validation(frame_size=len(frame), drawn=drawn))
+
+    def _not_proposed(self, cells: Iterable[Cell]) -> list[Cell]:
+        return [cell for cell in cells if cell not in self._awaited and cell not in self.map.results]

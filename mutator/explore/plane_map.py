@@ -1,0 +1,165 @@
+"""A plane's cells as far as they are known: driven, inferred, and what lies between such cells."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from mutator.explore.cell_results import CellResult, CellState
+from mutator.explore.lattice import Cell, Lattice
+
+MOST_DIFFERENCE = 2  # cells by which the ends of two lines may differ for those between them to be drawn
+
+Line = list[CellState]
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Where a line changes between cells with and without a hazard.
+
+    `starts_hazardous` is the state of the shortest duration. `changes` are the numbers of the first cell
+    after each change. A line with cells that are not known between two that differ is not closed.
+    """
+
+    starts_hazardous: bool
+    changes: tuple[int, ...]
+    is_closed: bool
+
+    @property
+    def is_simple(self) -> bool:
+        """Whether a longer fault is never less dangerous."""
+        return self.is_closed and len(self.changes) + self.starts_hazardous <= 1
+
+    def first_hazardous(self, cell_count: int) -> int:
+        """Return the number of the first hazardous cell; `cell_count` if there is none."""
+        return 0 if self.starts_hazardous else (*self.changes, cell_count)[0]
+
+    def resembles(self, other: "Profile") -> bool:
+        """Whether lines between these two can be drawn, without another line in between."""
+        return (
+            self.is_closed
+            and other.is_closed
+            and self.starts_hazardous is other.starts_hazardous
+            and len(self.changes) == len(other.changes)
+            and all(abs(a - b) <= MOST_DIFFERENCE for a, b in zip(self.changes, other.changes, strict=True))
+        )
+
+
+@dataclass(slots=True)
+class PlaneMap:
+    """The results of a plane's cells, and what follows from them."""
+
+    lattice: Lattice
+    results: dict[Cell, CellResult] = field(default_factory=dict)
+    inferring: dict[int, tuple[int, CellResult]] = field(
+        default_factory=dict
+    )  # first inferred cell of a line
+
+    def add(self, cell: Cell, result: CellResult) -> None:
+        self.results[cell] = result
+        if result.inferred_from_s is None:
+            return
+        line, _ = cell
+        durations = self.lattice.durations_s
+        first = next(j for j, duration in enumerate(durations) if duration >= result.inferred_from_s)
+        if line not in self.inferring or first < self.inferring[line][0]:
+            self.inferring[line] = first, result
+
+    def state(self, cell: Cell) -> CellState | None:
+        """Return what was driven or inferred; None if neither."""
+        if cell in self.results:
+            return self.results[cell].state
+        line, duration = cell
+        if line in self.inferring and duration >= self.inferring[line][0]:
+            return CellState.INFERRED
+        return None
+
+    def proof_of(self, cell: Cell) -> CellResult | None:
+        """Return the result that decides a driven or inferred cell; None for others."""
+        if self.state(cell) is CellState.INFERRED:
+            return self.inferring[cell[0]][1]
+        return self.results.get(cell)
+
+    def decided(self, line: int) -> list[tuple[int, bool]]:
+        """Return the decided cells of a line: the number of the duration, and whether it is hazardous."""
+        states = ((j, self.state((line, j))) for j in range(len(self.lattice.durations_s)))
+        return [(j, s.is_hazardous) for j, s in states if s and s is not CellState.NOT_DECIDED]
+
+    def open_pairs(self, line: int) -> Iterator[tuple[int, int]]:
+        """Yield neighbours among the decided cells of a line that differ and have undriven cells between."""
+        for (before, was_hazardous), (after, is_hazardous) in pairwise(self.decided(line)):
+            between = range(before + 1, after)
+            if was_hazardous is not is_hazardous and any(self.state((line, j)) is None for j in between):
+                yield before, after
+
+    def profile(self, line: int) -> Profile | None:
+        """Return where the line changes; None if nothing of it is decided."""
+        decided = self.decided(line)
+        if not decided:
+            return None
+        changes = tuple(after for (_, a), (after, b) in pairwise(decided) if a is not b)
+        return Profile(
+            starts_hazardous=decided[0][1], changes=changes, is_closed=not any(self.open_pairs(line))
+        )
+
+    def cells(self, closed_lines: Sequence[int]) -> list[Line]:
+        """Return the state of every cell, by magnitude and duration.
+
+        `closed_lines` are the lines that were searched, ascending. Other lines are drawn between them where
+        they resemble each other; where not, only cells in which both agree.
+        """
+        lines = [self._driven_line(line) for line in range(len(self.lattice.magnitudes))]
+        for line in closed_lines:
+            _fill_gaps(lines[line])
+        for below, above in pairwise(closed_lines):
+            for line in range(below + 1, above):
+                self._draw_between(lines, below, line, above)
+        return lines
+
+    def _driven_line(self, line: int) -> Line:
+        states = (self.state((line, j)) for j in range(len(self.lattice.durations_s)))
+        return [state or CellState.UNKNOWN for state in states]
+
+    def _draw_between(self, lines: list[Line], below: int, line: int, above: int) -> None:
+        share = (line - below) / (above - below)
+        first, second = self.profile(below), self.profile(above)
+        drawn: list[bool] | None = None
+        if first and second and first.resembles(second):
+            ends = [round(a + share * (b - a)) for a, b in zip(first.changes, second.changes, strict=True)]
+            drawn = [
+                first.starts_hazardous is not (sum(end <= j for end in ends) % 2 == 1)
+                for j in range(len(lines[line]))
+            ]
+        for j, state in enumerate(lines[line]):
+            if state is not CellState.UNKNOWN:
+                continue
+            neighbours = lines[below][j], lines[above][j]
+            if CellState.UNKNOWN in neighbours or CellState.NOT_DECIDED in neighbours:
+                continue
+            hazardous = [neighbour.is_hazardous for neighbour in neighbours]
+            if hazardous[0] is hazardous[1]:
+                lines[line][j] = _between(hazardous[0])
+            elif drawn is not None:
+                lines[line][j] = _between(drawn[j])
+
+
+def _between(is_hazardous: bool) -> CellState:
+    return CellState.BETWEEN_HAZARDOUS if is_hazardous else CellState.BETWEEN_WITHOUT
+
+
+def _fill_gaps(line: Line) -> None:
+    """Fill what lies between two decided cells that agree, shorter durations than the first one, and longer
+    ones than a hazardous last one.
+    """
+    decided = [
+        (j, state.is_hazardous)
+        for j, state in enumerate(line)
+        if state not in (CellState.UNKNOWN, CellState.NOT_DECIDED)
+    ]
+    if not decided:
+        return
+    for (before, was_hazardous), (after, is_hazardous) in pairwise([(-1, decided[0][1]), *decided]):
+        if was_hazardous is is_hazardous and CellState.NOT_DECIDED not in line[before + 1 : after]:
+            line[before + 1 : after] = [_between(is_hazardous)] * (after - before - 1)
+    last, is_last_hazardous = decided[-1]
+    if is_last_hazardous and CellState.NOT_DECIDED not in line[last:]:
+        line[last + 1 :] = [_between(True)] * (len(line) - last - 1)
