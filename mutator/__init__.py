@@ -19,6 +19,7 @@ NAMES_BY_MODULE = {
     "mutator.api.campaigns": ("run",),
     "mutator.api.comparisons": ("RunComparison", "compare", "write_history"),
     "mutator.api.experiments": ("build_experiment",),
+    "mutator.api.explorations": ("Envelopes", "envelope"),
     "mutator.api.experiment_results": ("TraceFrames",),
     "mutator.api.libraries": (
         "check_hazard_analysis",
@@ -42,6 +43,7 @@ NAMES_BY_MODULE = {
     "mutator.comparison.run_comparison_and_gates": ("Gate",),
     "mutator.errors": ("CheckFailed", "IncompleteRun", "MutatorError", "MutatorWarning"),
     "mutator.execution.session_summary": ("Summary",),
+    "mutator.explore.envelope": ("Envelope",),
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
     "mutator.onboarding.library_import": ("EntryOutcome", "ImportedEntry", "ImportedLibrary"),

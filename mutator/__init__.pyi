@@ -14,6 +14,8 @@ from mutator.api.comparisons import compare as compare
 from mutator.api.comparisons import write_history as write_history
 from mutator.api.experiment_results import TraceFrames as TraceFrames
 from mutator.api.experiments import build_experiment as build_experiment
+from mutator.api.explorations import Envelopes as Envelopes
+from mutator.api.explorations import envelope as envelope
 from mutator.api.libraries import check_hazard_analysis as check_hazard_analysis
 from mutator.api.libraries import check_library as check_library
 from mutator.api.libraries import check_target as check_target
@@ -44,6 +46,7 @@ from mutator.errors import IncompleteRun as IncompleteRun
 from mutator.errors import MutatorError as MutatorError
 from mutator.errors import MutatorWarning as MutatorWarning
 from mutator.execution.session_summary import Summary as Summary
+from mutator.explore.envelope import Envelope as Envelope
 from mutator.exports import Format as Format
 from mutator.model import Experiment as Experiment
 from mutator.model import Fault as Fault
@@ -70,6 +73,8 @@ __all__ = [
     "CheckFailed",
     "Choices",
     "EntryOutcome",
+    "Envelope",
+    "Envelopes",
     "Experiment",
     "Fault",
     "Format",
@@ -110,6 +115,7 @@ __all__ = [
     "compare",
     "doctor",
     "draw_control_structure",
+    "envelope",
     "find_place_notes",
     "find_places",
     "import_library",

@@ -90,7 +90,7 @@ def open_bench(
         finishing(opened),
     ):
         yield Bench(opened, selected_target, values["reading"])
-    _warn_of_end(opened.summary)
+    warn_of_end(opened.summary)
 
 
 class Bench:
@@ -187,7 +187,7 @@ def distributor_of_cluster(cluster: str | None, *, insecure_network: bool) -> Di
     return distributor if cluster is not None else None
 
 
-def _warn_of_end(summary: Summary | None) -> None:
+def warn_of_end(summary: Summary | None) -> None:
     if summary is None or not summary.exit_code:
         return
     if summary.exit_code == EXIT_CHECK_FAILED:

@@ -2,14 +2,14 @@
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import TypeVar, cast, overload
 
 from mutator._common.argument_checks import check_number, check_whole_number
 from mutator._common.message_text import spelling_suggestion
-from mutator.api.benches import bench_values, distributor_of_cluster
+from mutator.api.benches import bench_values, distributor_of_cluster, warn_of_end
 from mutator.api.experiments import ExperimentBuilder
 from mutator.api.scenario_choice import ScenarioLike, concrete_scenario_of
 from mutator.api.target_and_fault_selection import (
@@ -20,8 +20,10 @@ from mutator.api.target_and_fault_selection import (
     open_workspace,
 )
 from mutator.campaigns.exploration_section import ExplorationSection, ExploredPlane
+from mutator.config.units import UNITS
 from mutator.errors import MutatorError
 from mutator.execution.bench_opening import finishing, opened_bench
+from mutator.execution.session_summary import Summary
 from mutator.explore.envelope import Envelope
 from mutator.explore.exploration_run import run_exploration
 from mutator.explore.lattice import durations_between
@@ -32,8 +34,27 @@ from mutator.model import Experiment
 from mutator.store.run_progress import ProgressCallback
 
 DEFAULT_POINTS, DEFAULT_LONGEST_S, DEFAULT_OBSERVE_S = 51, 15.0, 15.0
-_NAME = "envelope"
+_NAME, _ABOUT = "envelope", "How large and how long faults may be before a hazard follows."
 _T = TypeVar("_T")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Envelopes(Sequence[Envelope]):
+    """The envelopes of an exploration, in the order in which its planes were asked for."""
+
+    run: Path  #: the run folder
+    envelopes: tuple[Envelope, ...]  #: an envelope for each fault, scenario and start
+    summary: Summary | None  #: the summary of the bench; None if nothing was planned
+
+    def __len__(self) -> int:
+        return len(self.envelopes)
+
+    @overload
+    def __getitem__(self, index: int) -> Envelope: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Envelope, ...]: ...
+    def __getitem__(self, index: int | slice) -> Envelope | tuple[Envelope, ...]:
+        return self.envelopes[index]
 
 
 def envelope(
@@ -59,14 +80,15 @@ def envelope(
     insecure_network: bool = False,
     progress: ProgressCallback | None = None,
     workspace: WorkspaceLike = None,
-) -> "list[Envelope]":
+) -> "Envelopes":
     """Find how large and how long faults may be before a hazard follows.
 
-    Each variant of `specs` (names, `*` is a wildcard), scenario and start is a plane: magnitudes by durations,
-    each with about `points` values at equal distances of their logarithm. The search drives few of its cells.
-    A validation then drives cells that were drawn from those called without hazard.
+    Each variant of `specs` (names, `*` is a wildcard), scenario and start is a plane: magnitudes by
+    durations, each with at most `points` values at equal distances of their logarithm. The search drives few
+    of its cells. A validation then drives cells that were drawn from those called without hazard.
 
-    * `starts`: times in s, or contexts of the hazard analysis: the first time at which the golden run is in it.
+    * `starts`: times in s, or contexts of the hazard analysis: the first time at which the golden run is in
+      it.
     * `longest_s`: the longest duration. `observe_s`: how long the drive must go on after a fault to count as
       without hazard.
     * `search`: the most runs of a plane's search; `validation`: the cells that are drawn, 0 for none.
@@ -75,8 +97,8 @@ def envelope(
     * `seed`: of the runs, and of what validation and proof draw. `reading`, `workers`, `engine`, `reuse`,
       `cluster`, `insecure_network`: as for `open_bench`; `progress`: as for `run`.
 
-    The run folder `out` is that of a bench. MutatorError for invalid input, and if a golden run never reaches a
-    start; CheckFailed if a golden run fails its checks.
+    The run folder `out` is that of a bench. MutatorError for invalid input, and if a golden run never reaches
+    a start; CheckFailed if a golden run fails its checks.
     """
     for name, value in (("points", points), ("search", search), ("workers", workers)):
         check_whole_number(name, value, least=1)
@@ -145,7 +167,9 @@ def envelope(
             build,
             may_begin=lambda: end is None or time.monotonic() < end,
         )
-    return [Envelope(plane) for plane in exploration.planes]
+    warn_of_end(bench.summary)
+    envelopes = tuple(Envelope(plane) for plane in exploration.planes)
+    return Envelopes(run=Path(out), envelopes=envelopes, summary=bench.summary)
 
 
 def _planes(
@@ -167,6 +191,7 @@ def _planes(
         for start in starts
     ]
     for spec, variant in _chosen_variants(selected_target, names):
+        unit = UNITS[variant.draw.unit].symbol if variant.draw and variant.draw.unit else ""
         for magnitudes in magnitudes_by_sign(variant, points):
             for scenario in scenarios:
                 concrete = concrete_scenario_of(workspace, scenario)
@@ -178,6 +203,7 @@ def _planes(
                         condition=trigger.condition,
                         armed_after_s=trigger.armed_after_s,
                         magnitudes=magnitudes,
+                        unit=unit,
                         durations_s=list(durations),
                         seed=seed,
                     )

@@ -20,18 +20,15 @@ class ExploredPlane:
         metadata=yaml_metadata("The full name of a variant, `<module>/<fault_type>/<variant>`.")
     )
     scenario: str = field(
-        metadata=yaml_metadata(
-            "A scenario's name, or a family with values: `r157_deceleration:ego=60,gap=20`."
-        )
+        metadata=yaml_metadata("A scenario's name, or a family with values: `r157_deceleration:ego=60`.")
     )
     start: str = field(
-        metadata=yaml_metadata(
-            "When the fault begins, as it was asked for: a time in s, or a context's name."
-        )
+        metadata=yaml_metadata("When the fault begins, as it was asked for: a time in s or a context.")
     )
     condition: str = field(
         metadata=yaml_metadata(
-            "The same as a condition over observed values. The fault begins when the golden run first meets it."
+            "The same as a condition over observed values. The fault begins when the golden run first "
+            "meets it."
         )
     )
     armed_after_s: float = field(
@@ -40,13 +37,14 @@ class ExploredPlane:
     )
     magnitudes: list[float] = field(
         metadata=yaml_metadata(
-            "The values of the fault, in the unit of its spec, by their size. Empty for a fault without a value.",
+            "The values of the fault, in the unit of its spec, by their size. Empty for a fault without one.",
             max_length=_MOST_POINTS,
         )
     )
     durations_s: list[float] = field(
         metadata=yaml_metadata("How long the fault lasts, ascending.", min_length=1, max_length=_MOST_POINTS)
     )
+    unit: str = field(default="", metadata=yaml_metadata("The unit of the magnitudes; empty without one."))
     seed: int = field(default=0, metadata=yaml_metadata("The seed of the runs.", ge=0, lt=2**63))
 
 
@@ -73,8 +71,8 @@ class ExplorationSection:
     validation: int = field(
         default=86,
         metadata=yaml_metadata(
-            "How many cells of each plane are drawn from those that the search calls without hazard, and driven. "
-            "0: none.",
+            "How many cells of each plane are drawn from those that the search calls without hazard, and "
+            "driven. 0: none.",
             ge=0,
             le=100_000,
         ),

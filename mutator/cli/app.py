@@ -25,6 +25,7 @@ from mutator._common.version import VERSION
 from mutator.cli import (
     cache_command,
     compare_command,
+    envelope_command,
     export_command,
     import_command,
     init_command,
@@ -67,6 +68,7 @@ SUBCOMMAND_GROUPS = (
     ("Look around", ("list", "places", "init", "import", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
     ("Before a campaign", ("review",)),
+    ("How much is survived", ("envelope",)),
     ("Campaigns", ("plan", "run", "watch", "merge", "report", "clean")),
     ("After a campaign", ("compare", "export", "verify", "seal")),
     ("One experiment", ("show", "rerun")),
@@ -145,6 +147,7 @@ for module in (
     merge_report_clean_commands,
     verify_and_seal_commands,
     compare_command,
+    envelope_command,
     export_command,
     show_and_rerun_commands,
     serve_command,

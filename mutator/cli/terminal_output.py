@@ -242,6 +242,8 @@ _OPTION_BY_ARGUMENT = {
     "id": "EXPERIMENT",
     "target": "--manifest",
     "triggers": "--trigger",
+    "scenarios": "--scenario",
+    "starts": "--at",
 }
 
 

@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.confined_files import path_below
 from mutator._common.interrupts import delaying_interrupts
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.plan_growth import APPENDED_FILES, GrowingPlan
@@ -167,22 +166,13 @@ class Bench:
         with self._calling():
             return self._prove()
 
-    def checked_golden_folders(self, experiments: Iterable[Experiment]) -> dict[GoldenRun, Path]:
-        """Check the golden runs of experiments, without planning these, and return the folder of each golden
-        run's output, to be read before the next call.
+    def checked_golden_folders(self, experiments: Iterable[Experiment]) -> Mapping[GoldenRun, Path]:
+        """Check the golden runs of these experiments, without planning them, and return where each is until
+        the next call.
         """
         with self._calling():
-            batch = self._check_batch(experiments, "")
-            ensure_work_folder(self.path / "work")
-            new_goldens = self._checks.check_goldens(self._plan.golden_runs_with(batch))
-            of_batch = {GoldenRun.for_experiment(experiment, several_seeds=True) for experiment in batch}
-            return {
-                golden: path_below(
-                    (self._checks.pending_folder if golden in new_goldens else self.path) / "golden",
-                    golden.key,
-                )
-                for golden in of_batch
-            }
+            golden_runs = self._plan.golden_runs_with(self._check_batch(experiments, ""))
+            return self._checks.checked_folders(self.path, golden_runs)
 
     def finish(self) -> None:
         """Close the bench: prove it if all planned experiments have a record, and write tables, seal and

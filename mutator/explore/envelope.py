@@ -37,18 +37,21 @@ class BoundaryPair:
 class Envelope:
     """What faults of one kind do in one scenario from one start on, by magnitude and duration."""
 
-    exploration: PlaneExploration
+    exploration: PlaneExploration  #: the plane's search and validations
 
     @property
     def plane(self) -> ExploredPlane:
+        """What was asked for."""
         return self.exploration.plane
 
     @property
     def drive(self) -> Drive:
+        """When the fault starts, and when the drive ends, in s."""
         return self.exploration.drive
 
     @property
     def durations_s(self) -> tuple[float, ...]:
+        """How long the fault lasts, in s, ascending."""
         return self.exploration.map.lattice.durations_s
 
     @property
@@ -70,6 +73,18 @@ class Envelope:
     def validation(self) -> Validation | None:
         """The newest validation; None without one."""
         return self.exploration.validations[-1] if self.exploration.validations else None
+
+    @property
+    def longest_tried_s(self) -> float:
+        """The longest duration that leaves time to observe what follows, in s."""
+        return self.durations_s[min(self.exploration.decidable, len(self.durations_s)) - 1]
+
+    def survives(self, magnitude: float | None, duration_s: float) -> bool:
+        """Return whether the cell that is at least as large and long as this fault is called without hazard.
+
+        False does not mean a hazard: `state_at` says why.
+        """
+        return self.state_at(magnitude, duration_s).is_without_hazard
 
     def state_at(self, magnitude: float | None, duration_s: float) -> CellState:
         """Return the state of the cell that is at least as large and long as this fault; unknown if it is
@@ -185,16 +200,16 @@ def _last_at_most(values: Sequence[float], value: float) -> int | None:
 
 def _connected_groups(cells: set[Cell]) -> Iterator[list[Cell]]:
     """Yield groups of cells that touch each other, also at corners."""
-    left = set(cells)
+    remaining = set(cells)
     for start in sorted(cells):
-        if start not in left:
+        if start not in remaining:
             continue
-        left.discard(start)
+        remaining.discard(start)
         group, queue = [start], deque([start])
         while queue:
             i, j = queue.popleft()
-            beside = {(i + a, j + b) for a in (-1, 0, 1) for b in (-1, 0, 1)} & left
-            left -= beside
+            beside = {(i + a, j + b) for a in (-1, 0, 1) for b in (-1, 0, 1)} & remaining
+            remaining -= beside
             group += sorted(beside)
             queue += sorted(beside)
         yield sorted(group)

@@ -8,7 +8,7 @@ from mutator.errors import MutatorError
 from mutator.execution.bench import Bench
 from mutator.explore.cell_results import Drive
 from mutator.explore.exploration import BatchLoop, Exploration, Proposal
-from mutator.explore.golden_drives import drive_of, load_golden_trace
+from mutator.explore.golden_drives import drive_of, load_observed_values
 from mutator.model import Experiment, Record, Status
 from mutator.store.golden_runs import GoldenRun
 from mutator.targets.manifest import TargetManifest
@@ -48,9 +48,9 @@ def _find_drives(
     samples = [build(p, (*p.magnitudes, None)[0], 0.0, p.durations_s[0]) for p in section.planes]
     folders = bench.checked_golden_folders(samples)
     golden_runs = [GoldenRun.for_experiment(sample, several_seeds=True) for sample in samples]
-    traces = {golden: load_golden_trace(manifest, folder) for golden, folder in folders.items()}
+    observed = {golden: load_observed_values(manifest, folder) for golden, folder in folders.items()}
     return [
-        drive_of(manifest, traces[golden], plane)
+        drive_of(manifest, observed[golden], plane)
         for golden, plane in zip(golden_runs, section.planes, strict=True)
     ]
 

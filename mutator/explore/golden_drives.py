@@ -1,6 +1,7 @@
 """The drives of planes: from when faults start to the end, as golden runs show it."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -8,32 +9,45 @@ import numpy as np
 from mutator.campaigns.exploration_section import ExploredPlane
 from mutator.errors import MutatorError
 from mutator.explore.cell_results import Drive
-from mutator.outcomes.hazard_and_metric_judgement import formula_values_by_name, load_manifest_channels
-from mutator.outcomes.trace_and_record_loading import Trace
+from mutator.outcomes.trace_and_record_loading import load_trace, values_on_steps
+from mutator.outcomes.trace_files import own_times
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import TIME
-from mutator.triggers.trace_formulas import condition_at_each_step
+from mutator.triggers.conditions import TIME, names_in
+from mutator.triggers.trace_formulas import condition_at_each_step, formula_at_each_step
 
 _MICROSECONDS_PER_S = 1e6
 
 
-def load_golden_trace(manifest: TargetManifest, folder: Path) -> Trace:
-    """Load the channels of the golden run in `folder` that conditions can name."""
-    return load_manifest_channels(manifest, folder)
+def load_observed_values(manifest: TargetManifest, folder: Path) -> Mapping[str, np.ndarray]:
+    """Return what the golden run in `folder` recorded of the values that conditions name, for each step."""
+    trace = load_trace(manifest, folder, (), manifest.channels)
+    times = np.asarray(trace[manifest.time_channel], dtype=float)
+    names = {name for name in trace if name != manifest.time_channel} - {own_times(name) for name in trace}
+    values = {TIME: times, **{name: values_on_steps(trace, name, times).astype(float) for name in names}}
+    for value in manifest.observation.derived:
+        if value.name not in values and all(name in values for name in names_in(value.text)):
+            values[value.name] = formula_at_each_step(value.text, values)
+    return values
 
 
-def drive_of(manifest: TargetManifest, golden: Trace, plane: ExploredPlane) -> Drive:
-    """Return the drive of a plane, whose golden run is `golden`.
+def drive_of(manifest: TargetManifest, golden: Mapping[str, np.ndarray], plane: ExploredPlane) -> Drive:
+    """Return the drive of a plane, whose golden run has the values `golden`.
 
-    MutatorError if the golden run never meets the plane's condition.
+    MutatorError if the golden run does not record what the plane's condition names, or never meets it.
     """
-    values = formula_values_by_name(manifest, golden)
-    times = values[TIME]
-    holds = condition_at_each_step(plane.condition, values) & (times >= plane.armed_after_s)
+    times = golden[TIME]
+    if unrecorded := [name for name in names_in(plane.condition) if name not in golden]:
+        raise MutatorError(
+            f"{plane.start}: the golden run does not record {', '.join(unrecorded)}",
+            argument="starts",
+            expected="a condition on channels of the manifest",
+            remedy="give a time in s, or record these values in channels of the same name",
+        )
+    holds = condition_at_each_step(plane.condition, golden) & (times >= plane.armed_after_s)
     if not holds.any():
         raise MutatorError(
-            f"no fault begins: {plane.scenario}, which ends at {float(times[-1]):g} s, never meets {plane.condition}",
-            argument="start",
+            f"{plane.scenario}, which ends at {float(times[-1]):g} s, never meets {plane.condition}",
+            argument="starts",
             expected="a start that the golden run reaches",
             remedy="choose another start or scenario",
         )

@@ -1,4 +1,4 @@
-"""The lattice on which an exploration drives: magnitudes and durations at equal distances of their logarithm."""
+"""The lattice of an exploration: magnitudes and durations at equal distances of their logarithm."""
 
 import math
 from dataclasses import dataclass
@@ -32,6 +32,7 @@ class Lattice:
 
 def magnitudes_between(first: float, last: float, points: int) -> tuple[float, ...]:
     """Return at most `points` magnitudes from `first` to `last`, rounded to three digits but for the ends."""
+    first, last = (float(f"{end:.12g}") for end in (first, last))  # 2.5, not 2.5000000000000004
     rounded = (_rounded(value) for value in _logarithmic_steps(first, last, points))
     return tuple(sorted({first, last, *(value for value in rounded if first < value < last)}))
 

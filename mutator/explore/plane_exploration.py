@@ -17,7 +17,7 @@ _CALLED_WITHOUT_HAZARD = (CellState.BETWEEN_WITHOUT,)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Validation:
-    """Cells drawn, without replacement, from the `frame_size` undriven ones that are called without hazard."""
+    """Cells drawn, without replacement, from the `frame_size` undriven ones called without hazard."""
 
     frame_size: int
     drawn: tuple[Cell, ...]
@@ -41,6 +41,7 @@ class PlaneExploration:
     _repaired_lines: set[int] = field(default_factory=set)
     _search_runs: int = 0
     _is_searching: bool = True
+    _proposals: list[Cell] | None = None  # of the search, with the results so far
 
     def __post_init__(self) -> None:
         magnitudes = tuple(self.plane.magnitudes) or (None,)
@@ -71,6 +72,7 @@ class PlaneExploration:
         """Take the result of a proposed cell."""
         self._awaited.discard(cell)
         self.map.add(cell, result)
+        self._proposals = None
 
     def _search(self) -> PlaneSearch:
         return PlaneSearch(
@@ -89,12 +91,15 @@ class PlaneExploration:
         if undriven or self._awaited or not failed or len(self.validations) == MOST_VALIDATIONS:
             return undriven
         self._repaired_lines |= failed
+        self._proposals = None
         self._is_searching = True
         return self._next_cells()
 
     def _next_in_search(self) -> list[Cell]:
         budget = self.section.search + _REPAIR_RUNS * len(self._repaired_lines) - self._search_runs
-        return self._not_proposed(self._search().proposals())[: max(0, budget)]
+        if self._proposals is None:
+            self._proposals = self._search().proposals()
+        return self._not_proposed(self._proposals)[: max(0, budget)]
 
     def _begin_validation(self) -> None:
         frame = list(cells_with(_CALLED_WITHOUT_HAZARD, self.cells()))

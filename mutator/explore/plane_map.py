@@ -50,12 +50,13 @@ class PlaneMap:
 
     lattice: Lattice
     results: dict[Cell, CellResult] = field(default_factory=dict)
-    inferring: dict[int, tuple[int, CellResult]] = field(
-        default_factory=dict
-    )  # first inferred cell of a line
+    # the first inferred cell of a line, and the result from which it follows
+    inferring: dict[int, tuple[int, CellResult]] = field(default_factory=dict)
+    _decided_by_line: dict[int, list[tuple[int, bool]]] = field(default_factory=dict)  # on demand
 
     def add(self, cell: Cell, result: CellResult) -> None:
         self.results[cell] = result
+        self._decided_by_line.pop(cell[0], None)
         if result.inferred_from_s is None:
             return
         line, _ = cell
@@ -81,8 +82,12 @@ class PlaneMap:
 
     def decided(self, line: int) -> list[tuple[int, bool]]:
         """Return the decided cells of a line: the number of the duration, and whether it is hazardous."""
-        states = ((j, self.state((line, j))) for j in range(len(self.lattice.durations_s)))
-        return [(j, s.is_hazardous) for j, s in states if s and s is not CellState.NOT_DECIDED]
+        if line not in self._decided_by_line:
+            states = ((j, self.state((line, j))) for j in range(len(self.lattice.durations_s)))
+            self._decided_by_line[line] = [
+                (j, state.is_hazardous) for j, state in states if state and state is not CellState.NOT_DECIDED
+            ]
+        return self._decided_by_line[line]
 
     def open_pairs(self, line: int) -> Iterator[tuple[int, int]]:
         """Yield neighbours among the decided cells of a line that differ and have undriven cells between."""

@@ -165,8 +165,8 @@ def range_doubling(begin: int, direction: int, end: int) -> Iterator[int]:
 
 def cells_with(states: Iterable[CellState], lines: list[list[CellState]]) -> Iterator[Cell]:
     """Yield the cells with one of these states, by magnitude and duration."""
-    wanted = frozenset(states)
+    selected = frozenset(states)
     for i, line in enumerate(lines):
         for j, state in enumerate(line):
-            if state in wanted:
+            if state in selected:
                 yield i, j

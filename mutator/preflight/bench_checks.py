@@ -13,6 +13,7 @@ from mutator.campaigns import run_environment
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import scenarios_sharing_runs
+from mutator.engines.job_folder import ensure_work_folder
 from mutator.engines.run_limits import measure_limits
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Experiment, Fault
@@ -164,6 +165,15 @@ class BenchChecks:
                 "this batch was planned",
             )
         return new
+
+    def checked_folders(self, run: Path, golden_runs: Sequence[GoldenRun]) -> Mapping[GoldenRun, Path]:
+        """Check the golden runs that are not stored yet, and return where the output of each is."""
+        ensure_work_folder(self.scratch_folder)
+        new = self.check_goldens(golden_runs)
+        return {
+            golden: path_below((self.pending_folder if golden in new else run) / "golden", golden.key)
+            for golden in golden_runs
+        }
 
     def _run_checks(self, new: Sequence[GoldenRun]) -> list[CheckResult]:
         """Run what is needed; note what passed, and return what failed."""

@@ -204,6 +204,7 @@ SHOWN_BY_THE_COMMAND_LINE = {
     "mutator.config.yaml_files",
     "mutator.engines.engine_kinds",
     "mutator.execution.progress_text",
+    "mutator.explore.envelope_texts",
     "mutator.exports",
     "mutator.mutants.patches_by_file",
     "mutator.results.plan_columns",

@@ -1,0 +1,89 @@
+"""Envelopes in words and as a table."""
+
+from collections.abc import Sequence
+
+from mutator._common.message_text import counted
+from mutator._common.phrase_texts import with_unit
+from mutator._common.table_rendering import TextTable
+from mutator.explore.envelope import Envelope
+
+TABLE_DURATIONS_S = (0.5, 1.0, 2.0)  # for which the table names the largest magnitude that is survived
+_HEADS = ("fault", "scenario", "from")
+
+
+def describe_envelope(envelope: Envelope) -> str:
+    """Return what is survived and what is not, in one sentence."""
+    plane = envelope.plane
+    where = f"{plane.spec} in {plane.scenario} from {_start_text(envelope)}"
+    failing = first_failing_line(envelope)
+    longest = f"{envelope.longest_tried_s:g} s"
+    if failing is None:
+        return f"{where}: no hazard, up to {_magnitude_text(envelope, -1)} for {longest}"
+    survived = envelope.largest_survived()
+    survives = (
+        f"{magnitude_text(envelope, survived)} is survived for every duration up to {longest}, "
+        if survived is not None
+        else ""
+    )
+    duration = envelope.shortest_hazardous_s(failing)
+    return f"{where}: {survives}{_magnitude_text(envelope, failing)} for {duration:g} s is not"
+
+
+def first_failing_line(envelope: Envelope) -> int | None:
+    """Return the smallest magnitude with a hazardous cell; None without one."""
+    lines = (i for i, line in enumerate(envelope.cells) if any(state.is_hazardous for state in line))
+    return next(lines, None)
+
+
+def envelope_table(envelopes: Sequence[Envelope]) -> TextTable:
+    """Return a row for each envelope: what is survived, and what the largest magnitude does."""
+    heads = [*_HEADS, "any time", *(f"{d:g} s" for d in TABLE_DURATIONS_S), "largest", "for", "hazard after"]
+    rows = [_table_row(envelope) for envelope in envelopes]
+    return TextTable(heads=heads, rows=rows, right_aligned=range(len(_HEADS), len(heads)))
+
+
+def _table_row(envelope: Envelope) -> list[str]:
+    plane = envelope.plane
+    durations: tuple[float | None, ...] = (None, *TABLE_DURATIONS_S)
+    last = len(envelope.magnitudes) - 1
+    longest, time = envelope.longest_survived_s(last), envelope.time_to_hazard_s(last)
+    return [
+        plane.spec,
+        plane.scenario,
+        _start_text(envelope),
+        *(_survived_text(envelope, duration) for duration in durations),
+        _magnitude_text(envelope, last),
+        "-" if longest is None else f"{longest:g} s",
+        "-" if time is None else f"{time:.2f} s",
+    ]
+
+
+def describe_validation(envelope: Envelope) -> str:
+    """Return how many cells were driven, and what the validation found."""
+    runs = f"{counted(envelope.run_count, 'run')} for {envelope.exploration.map.lattice.size:,} cells"
+    validation = envelope.validation
+    if validation is None:
+        return f"{runs}; not validated"
+    hazardous = len(envelope.exploration.failures(validation))
+    return f"{runs}; {hazardous} of {len(validation.drawn)} drawn cells hazardous"
+
+
+def magnitude_text(envelope: Envelope, magnitude: float | None) -> str:
+    """Return a magnitude with its unit; the fault alone if it has no value."""
+    return "the fault" if magnitude is None else with_unit(f"{magnitude:g}", envelope.plane.unit)
+
+
+def _magnitude_text(envelope: Envelope, line: int) -> str:
+    return magnitude_text(envelope, envelope.magnitudes[line])
+
+
+def _survived_text(envelope: Envelope, duration_s: float | None) -> str:
+    survived = envelope.largest_survived(duration_s)
+    if survived is None and envelope.magnitudes != (None,):
+        return "none"
+    return "-" if survived is None else magnitude_text(envelope, survived)
+
+
+def _start_text(envelope: Envelope) -> str:
+    start = envelope.plane.start
+    return f"{start} s" if start.replace(".", "", 1).isdigit() else f"{start} ({envelope.drive.start_s:g} s)"

@@ -1,0 +1,152 @@
+"""An exploration on a small target, through API and command line."""
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import mutator
+from mutator.cli.app import app
+from mutator.explore.cell_results import CellState
+from mutator.store.records import load_records
+from mutator.workspace import Workspace
+
+SPEC = "sensor/lane/shifted"
+_KILLS = 8
+_EXPLORE = """
+import sys
+import mutator
+
+workspace = mutator.Workspace.find(root=sys.argv[1])
+mutator.envelope(
+    "sensor/lane/shifted", ["A", "B"], 1, sys.argv[2], points=10, longest_s=3.0, observe_s=0.5, validation=20,
+    campaign="small", workers=int(sys.argv[3]), workspace=workspace,
+)
+"""
+
+
+def explore(workspace: Workspace, out: Path, points: int = 10, validation: int = 12) -> mutator.Envelopes:
+    return mutator.envelope(
+        SPEC,
+        "A",
+        1,
+        out,
+        points=points,
+        longest_s=3.0,
+        observe_s=0.5,
+        validation=validation,
+        campaign="small",
+        workspace=workspace,
+    )
+
+
+@pytest.mark.usefixtures("kept_checks")
+def test_an_envelope_is_an_ordinary_finished_run(toycar: Workspace, tmp_path: Path) -> None:
+    """The lane sensor may be 1 m wrong for any time, 2.5 m for a short one; the run folder is sealed, and the
+    same call again runs nothing.
+    """
+    explored = explore(toycar, tmp_path / "run")
+    [envelope] = explored
+    assert envelope.survives(0.5, 3.0) and not envelope.survives(2.5, 3.0) and envelope.survives(2.5, 0.05)
+    assert envelope.state_at(3.0, 1.0) is CellState.UNKNOWN  # larger than any that was asked for
+    assert (envelope.largest_survived() or 0) >= 0.8
+    pair = envelope.boundary_pair(len(envelope.magnitudes) - 1)
+    assert pair and pair.hazardous.hazard == "H3"
+    assert envelope.validation and envelope.exploration.failures(envelope.validation) == []
+    run = mutator.load_run(tmp_path / "run", workspace=toycar)
+    assert run.seal and run.verify().differences == () and len(run.records) == envelope.run_count
+    [again] = explore(toycar, tmp_path / "run")
+    assert again.as_json() == envelope.as_json()
+    assert mutator.load_run(tmp_path / "run", workspace=toycar).seal == run.seal
+
+
+@pytest.mark.usefixtures("kept_checks")
+@pytest.mark.parametrize(
+    ("start", "text"), [("far", "does not record"), ("d_rel < 0", "does not record"), (99, "never meets")]
+)
+def test_a_start_that_does_not_come_is_refused(
+    toycar: Workspace, tmp_path: Path, start: str | float, text: str
+) -> None:
+    """The golden run decides when a fault begins: nothing is planned unless it does."""
+    with pytest.raises(mutator.MutatorError, match=text):
+        mutator.envelope(SPEC, "A", start, tmp_path / "run", campaign="small", workspace=toycar)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.usefixtures("kept_checks")
+def test_the_command_says_what_is_survived(toycar: Workspace, tmp_path: Path) -> None:
+    """One sentence and one row for each plane; as JSON, the cells."""
+    words = [
+        "envelope",
+        SPEC,
+        "--scenario",
+        "A",
+        "--at",
+        "1",
+        "--out",
+        str(tmp_path / "run"),
+        "--points",
+        "4",
+    ]
+    words += ["--longest-s", "3", "--observe-s", "0.5", "--validation", "3", "--campaign", "small", "-n", "1"]
+    words += ["--library", str(toycar.library), "--templates", str(toycar.templates)]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    assert f"{SPEC} in A from 1 s: " in result.output and "0 of 3 drawn cells hazardous" in result.output
+    assert "hazard after" in result.output and "seal: " in result.output
+    [values] = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+    assert values["spec"] == SPEC and len(values["cells"]) == 4
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["sensor/lane/shift"], "no fault 'sensor/lane/shift'"),
+        ([SPEC, "--scenario", "Z"], "no scenario 'Z'"),
+        ([SPEC, "--at", "soon"], "no context 'soon'"),
+    ],
+)
+def test_wrong_words_are_refused(toycar: Workspace, tmp_path: Path, words: list[str], text: str) -> None:
+    """The error names what was got; no folder is left behind."""
+    rest = ["--library", str(toycar.library), "--templates", str(toycar.templates)]
+    defaults = {"--scenario": "A", "--at": "1"}
+    rest += [word for name, value in defaults.items() if name not in words for word in (name, value)]
+    result = CliRunner().invoke(app, ["envelope", *words, "--out", str(tmp_path / "run"), *rest])
+    assert isinstance(result.exception, mutator.MutatorError) and text in str(result.exception)
+    assert not (tmp_path / "run").exists()
+
+
+def begin(workspace: Workspace, out: Path, workers: int) -> subprocess.Popen[bytes]:
+    words = [str(workspace.library.parent), str(out), str(workers)]
+    return subprocess.Popen([sys.executable, "-c", _EXPLORE, *words], start_new_session=True)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("kept_checks")
+def test_kills_and_workers_change_nothing(toycar: Workspace, tmp_path: Path) -> None:
+    """Killed at random moments and resumed, with one worker, two and four: the same seal."""
+    assert begin(toycar, tmp_path / "1", 1).wait(900) == 0
+    alone = mutator.load_run(tmp_path / "1", workspace=toycar)
+    for workers in (2, 4):
+        assert begin(toycar, tmp_path / str(workers), workers).wait(900) == 0
+    out, rng = tmp_path / "killed", random.Random(5)
+    for _ in range(_KILLS):
+        process = begin(toycar, out, 2)
+        try:
+            process.wait(rng.uniform(2.0, 9.0))
+        except subprocess.TimeoutExpired:
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
+    assert begin(toycar, out, 2).wait(900) == 0
+    for name in ("2", "4", "killed"):
+        run = mutator.load_run(tmp_path / name, workspace=toycar)
+        assert run.seal == alone.seal is not None
+        assert dict(load_records(tmp_path / name)) == dict(load_records(tmp_path / "1"))
+        shutil.rmtree(tmp_path / name)
