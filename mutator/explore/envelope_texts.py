@@ -64,6 +64,8 @@ def describe_validation(envelope: Envelope) -> str:
     validation = envelope.validation
     if validation is None:
         return f"{runs}; not validated"
+    if not validation.drawn:
+        return f"{runs}; no other cell is called without hazard"
     hazardous = len(envelope.exploration.failures(validation))
     return f"{runs}; {hazardous} of {len(validation.drawn)} drawn cells hazardous"
 

@@ -42,6 +42,7 @@ from mutator.store.file_digests import FileDigest
 from mutator.store.golden_files import (
     GOLDEN_FOLDER,
     copy_golden,
+    golden_output_folder,
     list_golden_files,
     move_golden,
     stored_golden,
@@ -171,7 +172,9 @@ class BenchChecks:
         ensure_work_folder(self.scratch_folder)
         new = self.check_goldens(golden_runs)
         return {
-            golden: path_below((self.pending_folder if golden in new else run) / "golden", golden.key)
+            golden: golden_output_folder(
+                (self.pending_folder if golden in new else run) / GOLDEN_FOLDER, golden.key
+            )
             for golden in golden_runs
         }
 
