@@ -18,6 +18,7 @@ from mutator.errors import TooLarge
 
 MOST_FILE_BYTES = 128_000_000  # bytes of a file that is read as a whole; a reader can have another limit
 MOST_JSON_BYTES = 6_000_000  # bytes of a JSON object; as Python objects they can take 30 times as much memory
+MOST_RUN_JSON_BYTES = 24_000_000  # bytes of one that grows with golden runs: 10,000 of families have 9 MB
 MOST_EXPERIMENT_DATA_BYTES = 8_000_000_000  # bytes of a file that grows with the number of experiments
 MOST_LINE_BYTES = 4_000_000  # bytes of a line
 _NO_HOLES_FROM_BYTES = 64_000_000  # from this size, a file must not have holes

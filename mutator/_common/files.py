@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mutator._common.bounded_reading import MOST_JSON_BYTES, read_bounded
+from mutator._common.bounded_reading import MOST_RUN_JSON_BYTES, read_bounded
 from mutator.errors import DiskFull, MutatorError
 
 _DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)  # the disk, or the user's quota of it
@@ -255,7 +255,7 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 def read_json(path: Path, schema: str) -> dict[str, Any]:
     """Read a JSON object that has the schema `schema` (`name/version`)."""
     try:
-        data = read_bounded(path, MOST_JSON_BYTES)
+        data = read_bounded(path, MOST_RUN_JSON_BYTES)
     except OSError as err:
         if not is_no_file_error(err):
             raise

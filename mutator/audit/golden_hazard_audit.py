@@ -6,9 +6,11 @@ from mutator.audit.record_audit import StoredRecord
 from mutator.errors import MutatorError
 from mutator.model import Status
 from mutator.outcomes.hazard_and_metric_judgement import load_judged_run
+from mutator.outcomes.trace_and_record_loading import trace_digest
 from mutator.store import plan_file
 from mutator.store.checks_file import CHECKS_FILE
 from mutator.store.golden_files import GOLDEN_FOLDER, golden_output_folder
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.golden_verdicts import GoldenVerdict, load_golden_verdicts
 from mutator.store.planned_scenarios import planned_scenarios_of
 from mutator.store.run_folder import RunFolder
@@ -36,7 +38,7 @@ def golden_verdict_problems(folder: RunFolder, manifest: TargetManifest) -> Iter
         key = golden_run.key
         hazards, verdict = hazards_by_key.get(key, ()), verdicts[key] if needs_verdicts else None
         source = "trace" if golden_run in runs_with_files else "verdict"
-        judged = _verdict_of_trace(folder, manifest, key) if source == "trace" else verdict
+        judged = _verdict_of_trace(folder, manifest, golden_run) if source == "trace" else verdict
         if judged is not None and judged.hazards != hazards:
             got, expected = f"hazards {hazards} of golden run {key}", f"{judged.hazards}, as in its {source}"
             yield MutatorError(got, where=path, expected=expected)
@@ -44,14 +46,16 @@ def golden_verdict_problems(folder: RunFolder, manifest: TargetManifest) -> Iter
             yield MutatorError(f"the verdict of golden run {key}", where=path, expected="that of its trace")
 
 
-def _verdict_of_trace(folder: RunFolder, manifest: TargetManifest, key: str) -> GoldenVerdict:
-    trace, judged = load_judged_run(manifest, golden_output_folder(folder.path / GOLDEN_FOLDER, key))
+def _verdict_of_trace(folder: RunFolder, manifest: TargetManifest, golden_run: GoldenRun) -> GoldenVerdict:
+    output = golden_output_folder(folder.path / GOLDEN_FOLDER, golden_run.key)
+    trace, judged = load_judged_run(manifest, output)
     return GoldenVerdict(
         duration_s=float(trace[manifest.time_channel][-1]),
         t_end=judged.t_end,
         hazards=judged.hazards_by_time,
         alerts=judged.alerts,
         metrics=judged.metrics,
+        trace_digest="" if golden_run.seed is None else trace_digest(manifest, output),
     )
 
 

@@ -249,6 +249,5 @@ def plan_csv_lines(experiments: Iterable[Experiment], columns: Sequence[PlanColu
 
 
 def plan_csv_bytes(plan: Plan) -> bytes:
-    # the plan of a bench can get scenarios of other families at any time, its first line is written once
-    columns = columns_of_plan(() if plan.campaign.is_bench else plan.families)
+    columns = columns_of_plan(plan.families)
     return plan_csv_head(columns) + plan_csv_lines(plan.experiments, columns)

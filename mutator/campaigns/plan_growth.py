@@ -4,14 +4,15 @@ The digest goes on over the ids of all batches, whatever their borders. Borders 
 `plan/batches.jsonl`, whose lines name the digest of the line before.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from mutator._common.bounded_reading import read_bounded
+from mutator._common.bounded_reading import MOST_LINE_BYTES, open_regular, read_bounded
 from mutator._common.files import write_atomic
 from mutator._common.hashing import as_json_types, canonical_json, digest
 from mutator._common.version import VERSION
@@ -27,8 +28,9 @@ from mutator.campaigns.plan_freezing import PLAN_CSV, collect_target_facts, plan
 from mutator.campaigns.plan_tally import PlanDigestBuilder, PlanPart, PlanTally
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import run_key
+from mutator.families.family_facts import FamilyFacts
 from mutator.model import Experiment
-from mutator.results.plan_columns import columns_of_plan
+from mutator.results.plan_columns import PlanColumn, columns_of_plan
 from mutator.results.table_columns import check_parameter_names
 from mutator.store import file_digests, plan_file
 from mutator.store.appended_files import AppendedFile
@@ -130,16 +132,16 @@ class GrowingPlan:
         """
         for name in {e.concrete.family for e in experiments if e.concrete} - {*self._tally.families}:
             check_parameter_names(self._manifest, self._workspace.family(name).facts)
-        columns = columns_of_plan()
-        if not self.ids:
-            self._files[PLAN_CSV].add(plan_csv_head(columns))
         faults = {e.fault.id: e.fault for e in experiments if e.fault.id not in self._fault_ids}
         self._files[EXPERIMENTS_FILE].add(b"".join(map(plan_file.experiment_line, experiments)))
         self._files[FAULTS_FILE].add(b"".join(map(plan_file.fault_line, faults.values())))
-        self._files[PLAN_CSV].add(plan_csv_lines(experiments, columns))
         self._files[BATCHES_FILE].add(self._batches.line_of_next(len(experiments), reason))
-        planned = set(self._tally.golden_runs())
+        planned, columns_before = set(self._tally.golden_runs()), self._plan_columns() if self.ids else ()
         self._count(experiments)
+        if self._plan_columns() == columns_before:
+            self._files[PLAN_CSV].add(plan_csv_lines(experiments, columns_before))
+        else:  # the first batch, or the first scenario of a family
+            self._files[PLAN_CSV].replace(self._plan_csv(experiments))
         self._files[SCENARIOS_FILE].add(
             scenario_lines(
                 PlannedScenario(scenario=scenario.scenario, goldens=goldens)
@@ -149,6 +151,15 @@ class GrowingPlan:
         )
         self._write()
         return RunFolder(self._run.resolve())
+
+    def _plan_columns(self) -> Sequence[PlanColumn]:
+        return columns_of_plan(self._family_facts)
+
+    def _plan_csv(self, new: Iterable[Experiment] = ()) -> bytes:
+        """Return plan.csv of the experiments in the run folder and new ones."""
+        stored = plan_file.iterate_experiments(self._run) if RunFolder.exists(self._run) else ()
+        columns = self._plan_columns()
+        return plan_csv_head(columns) + plan_csv_lines(chain(stored, new), columns)
 
     def _count(self, experiments: Sequence[Experiment]) -> None:
         """Add experiments to all that run.json says about the plan."""
@@ -197,6 +208,19 @@ class GrowingPlan:
         for line in read_plan_lines(self._run / BATCHES_FILE):
             self._batches.count += 1
             self._batches.last_digest = sha256(line).hexdigest()
+        self._renew_plan_csv()
+
+    def _renew_plan_csv(self) -> None:
+        """Write plan.csv anew if a command was killed after it had replaced the file for a new family."""
+        with open_regular(self._run / PLAN_CSV) as file:
+            has_head = file.readline(MOST_LINE_BYTES) == plan_csv_head(self._plan_columns())
+        if not has_head:
+            file_digests.rewrite_file(self._run, PLAN_CSV, self._plan_csv())
+            self._files[PLAN_CSV] = AppendedFile(self._run, PLAN_CSV)
+
+    @property
+    def _family_facts(self) -> tuple[FamilyFacts, ...]:
+        return tuple(self._workspace.family(name).facts for name in self._tally.families)
 
     @property
     def _canary_id(self) -> str:
@@ -245,7 +269,7 @@ class GrowingPlan:
             phrases=self._current_phrases(),
             goldens=tuple(golden.to_stored() for golden in goldens),
             scenarios=scenarios.sha256 if scenarios.size else None,
-            families=tuple(self._workspace.family(name).facts for name in self._tally.families),
+            families=self._family_facts,
             sources=self._sources(),
             stretches=stored.stretches,
             chunks=tuple(self._chunks),

@@ -67,14 +67,15 @@ def read_check_run(manifest: TargetManifest, execution: JobResult) -> CheckRun:
     )
 
 
-def golden_verdict_of(run: CheckRun) -> GoldenVerdict:
-    """Return what checks.json stores of a golden run."""
+def golden_verdict_of(run: CheckRun, *, has_seed: bool) -> GoldenVerdict:
+    """Return what checks.json stores of a golden run; `has_seed`: whether its key has a seed."""
     return GoldenVerdict(
         duration_s=run.duration_s,
         t_end=run.t_end,
         hazards=run.hazards,
         alerts=run.alerts,
         metrics=run.metrics,
+        trace_digest=run.trace_digest if has_seed else "",
     )
 
 

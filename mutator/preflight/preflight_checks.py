@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ from mutator._common import cached_folders
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import path_below, unlink_below
 from mutator._common.files import json_bytes, raising_disk_full, read_json, remove_folder, write_atomic
-from mutator._common.hashing import as_json_types, digest
+from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
 from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.campaigns.campaign_files import Campaign
@@ -18,6 +18,7 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import scenarios_sharing_runs
 from mutator.engines.observation_store import ObservationStore
 from mutator.errors import CheckFailed, DiskFull, MutatorError
+from mutator.families.family import argument_of
 from mutator.limits import Limits
 from mutator.preflight import preflight_cache, unreached_triggers
 from mutator.preflight.canary_check import CanaryVerdict
@@ -55,7 +56,7 @@ from mutator.store.checks_file import (
 from mutator.store.file_digests import FileDigest
 from mutator.store.golden_files import GOLDEN_FOLDER, copy_golden, move_golden, stored_golden
 from mutator.store.golden_runs import GoldenRun
-from mutator.store.golden_verdicts import GOLDEN_VERDICTS_KEY
+from mutator.store.golden_verdicts import golden_verdicts_as_json
 from mutator.store.preflight_results import CheckResult
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -263,22 +264,22 @@ class PreflightChecks:
         """Return what golden runs came to, if some are those of families, or if there is no experiment."""
         if self.workspace.planned_scenarios is None and not self.campaign.is_fault_free:
             return {}
-        verdicts = {key.key: as_json_types(golden_verdict_of(runs[GOLDEN, key])) for key in self.golden_runs}
-        return {GOLDEN_VERDICTS_KEY: verdicts}
+        verdicts = {
+            key.key: golden_verdict_of(runs[GOLDEN, key], has_seed=key.seed is not None)
+            for key in self.golden_runs
+        }
+        return golden_verdicts_as_json(verdicts)
 
     @property
     def _can_use_cache(self) -> bool:
-        """Whether the cache saves anything. To repeat the runs of families would cost as much, and the
-        verdicts of drives without faults are results.
-        """
+        # to repeat the runs of families would cost as much, and verdicts of drives without faults are results
         return self.workspace.planned_scenarios is None and not self.campaign.is_fault_free
 
     def store_in_cache(self) -> None:
         """Store passed checks for other run folders."""
-        if not self._can_use_cache:
-            return
-        cached = preflight_cache.cached_checks_path(self.digest)
-        preflight_cache.store_passed_checks(cached, self.folder.path, CHECKS_FILE, self.pending_folder)
+        if self._can_use_cache:
+            cached = preflight_cache.cached_checks_path(self.digest)
+            preflight_cache.store_passed_checks(cached, self.folder.path, CHECKS_FILE, self.pending_folder)
 
     def place_golden_run(self, golden_run: GoldenRun, output_digest: str) -> None:
         """Copy a golden run whose own checks have passed into the run folder, where experiments need it.
@@ -357,7 +358,9 @@ class PreflightChecks:
             if planned is None or key.scenario not in planned.by_name:
                 yield from results
                 continue
-            yield from (result for result in results if not result.passed)
+            argument = argument_of(planned.by_name[key.scenario].scenario)
+            failed = (result for result in results if not result.passed)
+            yield from (replace(result, detail=f"{result.detail} ({argument})") for result in failed)
             runs_by_family.setdefault(planned.by_name[key.scenario].scenario.family, []).append(key)
         for family, keys in runs_by_family.items():
             detail = describe_family_runs(keys, once)

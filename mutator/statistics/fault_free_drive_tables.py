@@ -44,12 +44,28 @@ def load_judged_drives(folder: RunFolder) -> tuple[JudgedDrive, ...]:
 
 def describe_drives(drives: Sequence[JudgedDrive]) -> str:
     """Return the totals in a sentence: drives, hours, and how many had each hazard and alert."""
-    hours = sum(drive.verdict.driven_s for drive in drives) / _SECONDS_PER_HOUR
+    distinct = distinct_drives(drives)
+    equal = len(drives) - len(distinct)
     return (
-        f"{len(drives):,} fault-free drives, {hours:.2f} h; "
-        f"hazards: {_counted_names(_drives_by_name(d.verdict.hazards for d in drives))}; "
-        f"alerts: {_counted_names(_drives_by_name(d.verdict.alerts for d in drives))}"
+        f"{len(distinct):,} fault-free drives, {_hours(distinct):.2f} h; "
+        + (f"{equal:,} more are equal, with other seeds; " if equal else "")
+        + f"hazards: {_counted_names(_drives_by_name(d.verdict.hazards for d in distinct))}; "
+        f"alerts: {_counted_names(_drives_by_name(d.verdict.alerts for d in distinct))}"
     )
+
+
+def distinct_drives(drives: Iterable[JudgedDrive]) -> list[JudgedDrive]:
+    """Return the drives without those that equal one of the same scenario with another seed."""
+    first_by_trace: dict[GoldenRun | tuple[str, str], JudgedDrive] = {}
+    for drive in drives:
+        run, trace = drive.golden_run, drive.verdict.trace_digest
+        first_by_trace.setdefault((run._replace(seed=None).key, trace) if trace else run, drive)
+    return list(first_by_trace.values())
+
+
+def _hours(drives: Iterable[JudgedDrive]) -> float:
+    """Return the hours until a terminal hazard or the end."""
+    return sum(drive.verdict.driven_s for drive in drives) / _SECONDS_PER_HOUR
 
 
 def drives_by_group_sheet(
@@ -59,15 +75,16 @@ def drives_by_group_sheet(
     `lower` or `higher` values are worse; the worst value of all drives is shown.
     """
     lines: list[tuple[SheetCell, ...]] = []
-    for group in dict.fromkeys(drive.group for drive in drives):
-        mine = [drive for drive in drives if drive.group == group]
+    distinct = distinct_drives(drives)
+    for group in dict.fromkeys(drive.group for drive in distinct):
+        mine = [drive for drive in distinct if drive.group == group]
         with_hazard = _drives_by_name(drive.verdict.hazards for drive in mine)
         alerts = _drives_by_name(drive.verdict.alerts for drive in mine)
         lines.append(
             (
                 group,
                 len(mine),
-                sum(drive.verdict.driven_s for drive in mine) / _SECONDS_PER_HOUR,
+                _hours(mine),
                 *(with_hazard[name] for name in hazards),
                 _counted_names(alerts),
                 *(_worst(mine, name, direction) for name, direction in worse_direction.items()),
@@ -76,8 +93,9 @@ def drives_by_group_sheet(
     return Sheet(
         name="fault_free_drives",
         title="Fault-free drives",
-        note="Golden runs by family or scenario: hours until a terminal hazard or the end, drives with each "
-        "hazard, drives with each alert, and the worst value of each metric.",
+        note="Golden runs by family or scenario (equal ones of several seeds count once): hours until a "
+        "terminal hazard or the end, drives with each hazard, drives with each alert, and the worst value of "
+        "each metric.",
         heads=("scenario", "drives", "hours", *hazards, "alerts", *worse_direction),
         lines=tuple(lines),
     )

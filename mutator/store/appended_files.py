@@ -6,7 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import open_descriptor_below, path_below, read_below
+from mutator._common.confined_files import open_descriptor_below, path_below, read_below, write_below
 from mutator._common.files import raising_disk_full
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
@@ -26,6 +26,11 @@ class AppendedFile:
         data = read_bounded(path) if path.is_file() else b""
         self._hash, self._size = sha256(data), len(data)
         self._added = b""
+        self._is_replaced = False
+
+    def replace(self, data: bytes) -> None:
+        """Let the file have this content instead."""
+        self._hash, self._size, self._added, self._is_replaced = sha256(data), len(data), data, True
 
     def add(self, data: bytes) -> None:
         self._added += data
@@ -38,6 +43,10 @@ class AppendedFile:
 
     def write_added(self) -> None:
         added, self._added = self._added, b""
+        if self._is_replaced:
+            self._is_replaced = False
+            write_below(self._run, self.name, added)
+            return
         with raising_disk_full(path_below(self._run, self.name)):
             file = open_descriptor_below(self._run, self.name, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
             try:

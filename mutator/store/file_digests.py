@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 
 from mutator._common.bounded_reading import (
     MOST_EXPERIMENT_DATA_BYTES,
-    MOST_JSON_BYTES,
+    MOST_RUN_JSON_BYTES,
     check_file_size,
     open_regular,
     read_bounded,
@@ -164,7 +164,7 @@ def load_ledger(run: Path) -> DigestLedger:
     if not path.is_file():
         raise MutatorError("missing", where=path, expected="the digests of all files", remedy=remedy)
     data = read_json(path, DIGESTS_SCHEMA)
-    as_written = read_bounded(path, MOST_JSON_BYTES) == json_bytes(data)
+    as_written = read_bounded(path, MOST_RUN_JSON_BYTES) == json_bytes(data)
     if data.pop("sum", None) != digest(data) or not as_written:
         raise MutatorError(
             "changed since it was written",

@@ -10,6 +10,7 @@ import pytest
 
 import mutator
 from mutator._common.files import json_bytes
+from mutator.campaigns import plan_growth
 from mutator.campaigns.plan import build_plan, load_plan
 from mutator.campaigns.plan_tally import plan_digest
 from mutator.errors import CheckFailed, MutatorError
@@ -227,6 +228,44 @@ def test_a_bench_takes_scenarios_of_families(families: Workspace, tmp_path: Path
         assert bench.run([first])[0] == record
 
 
+@pytest.mark.parametrize("killed", [False, True])
+def test_the_plan_csv_of_a_bench_has_columns_of_families(
+    families: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, killed: bool
+) -> None:
+    """They come with the first scenario of a family, and the rows before get them, too. A command that is
+    killed while it plans this batch leaves no trace of it.
+    """
+    folder, out = families.library / "families", tmp_path / "bench"
+    other = FAMILY.replace("name: follow", "name: other").replace("gap_m", "space_m")
+    (folder / "other.yaml").write_text(other)
+    scenarios = ("A", "follow:ego=14,gap=30,lead=18", "other:ego=14,space=30,lead=18", "A")
+
+    def heads_after(scenario: str, trigger: str) -> str:
+        with mutator.open_bench(families, out, target="toycar") as bench:
+            bench.run([bench.build_experiment("sensor/distance/longer", scenario, trigger)])
+        return (out / "plan.csv").read_text().splitlines()[0].partition(",condition")[2]
+
+    assert heads_after(scenarios[0], "2") == ""
+    if killed:
+        with monkeypatch.context() as patch:
+            patch.setattr(plan_growth, "write_atomic", _die)
+            patch.setattr(plan_growth.GrowingPlan, "_renew_plan_csv", lambda plan: None)
+            with pytest.raises(KeyboardInterrupt):
+                heads_after(scenarios[1], "2")
+        assert (out / "plan.csv").read_text().splitlines()[0].endswith("lead_mps")
+    assert heads_after(scenarios[1], "2") == ",family,ego_mps,gap_m,lead_mps"
+    assert heads_after(scenarios[2], "2") == ",family,ego_mps,gap_m,lead_mps,space_m"
+    assert heads_after(scenarios[3], "3") == ",family,ego_mps,gap_m,lead_mps,space_m"
+    frame = pd.read_csv(out / "plan.csv")
+    assert frame["family"].fillna("").tolist() == ["", "follow", "other", ""]
+    assert frame["space_m"].fillna(0).tolist() == [0, 0, 30, 0]
+    assert mutator.verify(out, workspace=families).differences == ()
+
+
+def _die(path: Path, data: bytes) -> None:
+    raise KeyboardInterrupt
+
+
 def test_a_trial_in_a_scenario_of_a_family(families: Workspace) -> None:
     trial = mutator.try_fault(
         "sensor/distance/longer", "follow:ego=14,gap=30,lead=18", "2", workspace=families, target="toycar"
@@ -266,6 +305,46 @@ def test_a_campaign_without_faults_drives_its_scenarios(families: Workspace, tmp
     other = tmp_path / "other"
     assert run_campaign(families, "toy", other, engine="reference").exit_code == 0
     pd.testing.assert_frame_equal(mutator.load_run(other, workspace=families).drives(), drives)
+
+
+def test_equal_drives_of_several_seeds_count_once(families: Workspace, tmp_path: Path) -> None:
+    """The hours of a drive that another seed repeats are no more hours. Those of another drive are."""
+    without_faults(families, 3)
+    campaign, manifest = families.campaign("toy"), families.library / "targets" / "toycar.yaml"
+    campaign.write_text(campaign.read_text().replace("seed: 7", "seeds: {from: 7, to: 8}"))
+    text, notes = manifest.read_text(), []
+    assert '--number, "{seed}"' in text
+    for seed in ("{seed}", "7"):
+        manifest.write_text(text.replace('--number, "{seed}"', f'--number, "{seed}"'))
+        out = tmp_path / str(len(notes))
+        run_campaign(families, "toy", out, engine="fork")
+        run = mutator.load_run(out, workspace=families)
+        notes.append(run.drives_note())
+        assert len(run.drives()) == 8
+        assert mutator.verify(out, workspace=families).differences == ()
+    assert notes[0].startswith("8 fault-free drives, 0.01 h; hazards")
+    assert notes[1].startswith("4 fault-free drives, 0.01 h; 4 more are equal, with other seeds; hazards")
+    checks = json.loads((out / "checks.json").read_text())
+    checks["verdicts"]["A@8"]["trace_digest"] = "0" * 64  # as if it had been another drive
+    (out / "checks.json").write_bytes(json_bytes(checks))
+    forge_digests(out)
+    assert mutator.verify(out, workspace=families).differences
+
+
+def test_a_crash_without_a_fault_names_the_scenario(families: Workspace, tmp_path: Path) -> None:
+    """Nothing runs, and the message has the values with which `mutator try` drives the scenario."""
+    without_faults(families, 24)
+    world = families.manifest("toycar").root / "toycar" / "world.py"
+    moved = "self.gap += (self.lead_speed - self.speed) * STEP"
+    text = world.read_text()
+    assert moved in text
+    indent = text[: text.index(moved)].rpartition("\n")[2]
+    world.write_text(text.replace(moved, f"{moved}\n{indent}assert self.gap < 41 or self.gap > 90"))
+    with pytest.raises(
+        CheckFailed, match=r"^.* of \d+ checks .*golden follow-\w+.*: crashed: .*gap_m=40.*\)"
+    ):
+        run_campaign(families, "toy", tmp_path / "run", engine="fork")
+    assert not list((tmp_path / "run").glob("records/*"))
 
 
 def test_a_fork_that_differs_stops_the_family(
