@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import pandas as pd
-
 from mutator.figures import propagation_time_figure
 from mutator.figures.golden_and_faulty_plot import render_images
 from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.statistics.results_frame import select_common_columns
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 FIGURES_FOLDER, FIGURE_FORMATS = "figures", ("svg", "png")
@@ -33,7 +32,7 @@ class Drawing:
         return f"{FIGURES_FOLDER}/{self.name}.{suffix}"
 
 
-def draw_figures(frame: pd.DataFrame) -> tuple[Drawing, ...]:
+def draw_figures(frame: "pd.DataFrame") -> tuple[Drawing, ...]:
     """Return the figures that show what no part of the report's page shows; empty without a comparison."""
     frame = select_common_columns(frame)
     return (_draw_propagation_times(frame),) if families_or_scenarios_of(frame).nunique() > 1 else ()
@@ -49,7 +48,7 @@ def drawing_files(drawings: Sequence[Drawing]) -> dict[str, bytes]:
     return files
 
 
-def _draw_propagation_times(frame: pd.DataFrame) -> Drawing:
+def _draw_propagation_times(frame: "pd.DataFrame") -> Drawing:
     return Drawing(
         name="propagation_by_scenario",
         title="Propagation times by scenario",

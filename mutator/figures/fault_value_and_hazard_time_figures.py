@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from mutator.figures import figure_style
 from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.statistics.event_time_statistics import share_of_hazards_within
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -30,7 +30,7 @@ LabelledLimits = Sequence[tuple[float, str]]
 
 @figure_style.shipped_style()
 def draw_values(
-    points: pd.DataFrame, *, title: str, x_label: str, y_label: str, limits: LabelledLimits
+    points: "pd.DataFrame", *, title: str, x_label: str, y_label: str, limits: LabelledLimits
 ) -> "Figure":
     """Draw a mark for each row of `points`: `value` and `y`, with the scenario, or its family, as colour
     and shape, filled if `is_hazard`. Each of the `limits` is a height and its words.
@@ -69,7 +69,9 @@ def draw_values(
 
 
 @figure_style.shipped_style()
-def draw_times_to_hazard(frame: pd.DataFrame, fault: pd.DataFrame | None, reaction_time_s: float) -> "Figure":
+def draw_times_to_hazard(
+    frame: "pd.DataFrame", fault: "pd.DataFrame | None", reaction_time_s: float
+) -> "Figure":
     """Draw the share of hazards that have come by each time from the activation: of all runs of a frame and,
     if given, of those of one `fault`; with a line at a reaction time and the shares there.
     """

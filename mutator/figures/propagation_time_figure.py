@@ -3,19 +3,18 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import pandas as pd
-
 from mutator.figures import figure_style
 from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.statistics.event_time_statistics import TimeSpread, propagation_spreads_by_step
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
 @figure_style.shipped_style()
-def draw_times_by_scenario(frame: pd.DataFrame) -> "Figure":
+def draw_times_by_scenario(frame: "pd.DataFrame") -> "Figure":
     names = families_or_scenarios_of(frame)
     methods, scenarios = sorted(frame["method"].unique()), sorted(names.unique())
     spreads = {

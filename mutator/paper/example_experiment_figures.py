@@ -1,9 +1,7 @@
 """Draws figures of single experiments, found by a query over the results and confirmed in the traces."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from mutator._common.message_text import counted
 from mutator.errors import MutatorError
@@ -17,13 +15,16 @@ from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 QUERY_LABEL = "Query over results.csv"
 MOST_EXAMINED_CANDIDATES = 5  # candidates for each figure; examining one means unpacking two series
 
 
 def build_example_drawings(
     folder: RunFolder,
-    frame: pd.DataFrame,
+    frame: "pd.DataFrame",
     workspace: Workspace | None,
     figures: Sequence[ActionFigure] = ACTION_FIGURES,
 ) -> tuple[Drawing, ...]:
@@ -42,11 +43,13 @@ def build_example_drawings(
     return tuple(drawings)
 
 
-def candidate_rows(frame: pd.DataFrame, figure: ActionFigure) -> pd.DataFrame:
+def candidate_rows(frame: "pd.DataFrame", figure: ActionFigure) -> "pd.DataFrame":
     """Return the rows that the query finds, in the order in which they are examined.
 
     Empty if the target lacks the hazard or channel.
     """
+    import pandas as pd
+
     try:
         matches = frame.query(figure.query, engine="python")
     except pd.errors.UndefinedVariableError:
@@ -57,7 +60,7 @@ def candidate_rows(frame: pd.DataFrame, figure: ActionFigure) -> pd.DataFrame:
     return matches.sort_values([figure.order_column, "experiment_id"], ascending=[False, True])
 
 
-def _build_drawing(frame: pd.DataFrame, traces: RunTraces | None, figure: ActionFigure) -> Drawing:
+def _build_drawing(frame: "pd.DataFrame", traces: RunTraces | None, figure: ActionFigure) -> Drawing:
     rows = candidate_rows(frame, figure)
     if rows.empty:
         return _empty_drawing(figure, "no experiment of this run matches the query")

@@ -1,14 +1,16 @@
 """How well the order of fault types by hazards agrees with the published one."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mutator.paper.published_numbers import PublishedNumbers
 from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.tallies import tally_by_fault_type
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 GUIDED = "guided"
 
@@ -29,7 +31,7 @@ class RankAgreement:
     tied_there: int
 
 
-def measure_agreement(frame: pd.DataFrame, published: PublishedNumbers) -> RankAgreement:
+def measure_agreement(frame: "pd.DataFrame", published: PublishedNumbers) -> RankAgreement:
     """Compare guided experiments. Fault types that never activated, here or there, are left out."""
     tallies, pairs = tally_by_fault_type(frame), []
     for key, printed in published.tally_by_fault_type.items():

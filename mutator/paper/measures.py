@@ -13,14 +13,16 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator._common.message_text import counted
 from mutator.statistics import event_time_statistics, guided_against_random
 from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL, Share
 from mutator.statistics.shares_with_intervals import share_with_interval as wilson
 from mutator.statistics.tallies import tally_by_fault_type
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = [
     "Path",
@@ -54,17 +56,17 @@ class Estimate:
         return self.text
 
 
-def share(runs: pd.DataFrame, *, of: str, part: str) -> Estimate:
+def share(runs: "pd.DataFrame", *, of: str, part: str) -> Estimate:
     """Return the share of runs in `of` that are also in `part`, with Wilson's interval."""
     return estimate_of_share(_measure_share(runs, of, part))
 
 
-def difference(runs: pd.DataFrame, *, of: str, against: str, part: str) -> Estimate:
+def difference(runs: "pd.DataFrame", *, of: str, against: str, part: str) -> Estimate:
     """Return the share of `part` in `of` minus that in `against`, with Newcombe's interval."""
     return estimate_of_difference(_measure_share(runs, of, part), _measure_share(runs, against, part))
 
 
-def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
+def clustered_difference(runs: "pd.DataFrame", *, of: str) -> Estimate:
     """Return the hazard rate of guided runs minus that of random runs.
 
     The interval resamples whole faults (location and value).
@@ -90,7 +92,7 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
     )
 
 
-def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
+def stratified(runs: "pd.DataFrame", *, of: str) -> Estimate:
     """Return the odds ratio of a hazard, guided against random, over all fault types (Mantel-Haenszel)."""
     strata = guided_against_random.strata_with_both_methods(
         tally_by_fault_type(_select_runs(runs, of)), "injected"
@@ -112,7 +114,7 @@ def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
     )
 
 
-def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
+def paired(runs: "pd.DataFrame", *, of: str) -> Estimate:
     """Of the pairs in which only one run has a hazard, return the share in which it is the guided run.
 
     The Clopper-Pearson interval agrees with McNemar's exact test. `of` is a query on pairs, with column names
@@ -141,7 +143,7 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
     )
 
 
-def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
+def mean_time(runs: "pd.DataFrame", *, of: str, start: str, end: str) -> Estimate:
     """Return the mean of `end - start` in s over the runs in `of` that have both (Student's t interval)."""
     from scipy.stats import ttest_1samp  # type: ignore[import-untyped]
 
@@ -155,7 +157,7 @@ def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
     return _time_estimate(float(times_s.mean()), float(interval.low), float(interval.high), len(times_s))
 
 
-def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
+def median_time(runs: "pd.DataFrame", *, of: str) -> Estimate:
     """Return the Kaplan-Meier median of the time (s) from the first alert to a hazard.
 
     Times are censored at the end of the run (column `t_end`, simulated seconds). The median is infinite if
@@ -208,11 +210,11 @@ def estimate_of_difference(first: Share, second: Share) -> Estimate:
     return Estimate(value=difference, low=float(low), high=float(high), n=min(first.of, second.of), text=text)
 
 
-def _select_runs(runs: pd.DataFrame, query: str) -> pd.DataFrame:
+def _select_runs(runs: "pd.DataFrame", query: str) -> "pd.DataFrame":
     return runs.query(query, engine="python") if query else runs
 
 
-def _measure_share(runs: pd.DataFrame, of: str, part: str) -> Share:
+def _measure_share(runs: "pd.DataFrame", of: str, part: str) -> Share:
     query_words = {*re.findall(r"\w+", f"{of} {part}")}  # selecting rows is slow with all columns
     selected_runs = _select_runs(runs[[name for name in runs.columns if name in query_words]], of)
     return wilson(len(_select_runs(selected_runs, part)), len(selected_runs))

@@ -7,15 +7,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
 from pydantic import Field, model_validator
 
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_source_lines import YamlSource
 from mutator.paper.measures import MEASURES, Estimate, estimate_of_difference, estimate_of_share
 from mutator.statistics.shares_with_intervals import share_with_interval
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FILE_NAME = "paper_observations.yaml"
 SCHEMA = "paper_observations/1"
@@ -183,7 +185,7 @@ class JudgedObservation:
 
 def judge_observations(
     path: Path,
-    runs: pd.DataFrame,
+    runs: "pd.DataFrame",
     differences_from_papers_mixture: Sequence[str],
     *,
     only_needed: bool = False,
@@ -229,7 +231,7 @@ def combined_verdict(verdicts: Sequence[ClaimVerdict]) -> ClaimVerdict:
 def _judge_claim(
     number: str,
     claim: Claim,
-    runs: pd.DataFrame,
+    runs: "pd.DataFrame",
     differences_from_papers_mixture: Sequence[str],
     source: YamlSource,
     yaml_keys: tuple[str | int, ...],
@@ -266,7 +268,7 @@ def _answer_claim(
     measure_name: str,
     rule: ClaimRule,
     arguments: dict[str, str],
-    runs: pd.DataFrame,
+    runs: "pd.DataFrame",
     source: YamlSource,
     yaml_keys: tuple[str | int, ...],
 ) -> ClaimAnswer:

@@ -2,13 +2,15 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator._common.table_rendering import TextTable
 from mutator.paper.observation_judging import ClaimVerdict, JudgedObservation, judge_observations
 from mutator.statistics.seed_spread_tables import seeds_of
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 JudgedObservationsBySeed = Mapping[str, Sequence[JudgedObservation]]
 
@@ -20,7 +22,7 @@ SEEDS_NOTE = (
 
 
 def judge_by_seed(
-    path: Path, runs: pd.DataFrame, mixture_gaps_of: Callable[[pd.DataFrame], Sequence[str]]
+    path: Path, runs: "pd.DataFrame", mixture_gaps_of: Callable[["pd.DataFrame"], Sequence[str]]
 ) -> JudgedObservationsBySeed:
     """Judge the observations on the runs of each seed separately. Empty if there is only one seed.
 

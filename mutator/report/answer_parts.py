@@ -4,12 +4,15 @@ hazards came with a warning, or were *silent*.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 import numpy as np
-import pandas as pd
 
 from mutator.results.outcome_counting import first_hazard_times
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ALERT_BEFORE_HAZARD = "alert before the hazard"
 NO_ALERT, ALERT_AFTER_HAZARD = "no alert at all", "alert only after the hazard"
@@ -90,7 +93,7 @@ def was_or_were(count: int) -> str:
     return "was" if count == 1 else "were"
 
 
-def fault_type_counts(part: pd.DataFrame, whole: pd.DataFrame) -> list[tuple[str, int, int]]:
+def fault_type_counts(part: "pd.DataFrame", whole: "pd.DataFrame") -> list[tuple[str, int, int]]:
     """Each fault type with its number of rows in `part` and in `whole`, largest first."""
     parts = part["kind"].value_counts()
     counts = [(str(k), int(parts.get(k, 0)), int(n)) for k, n in whole["kind"].value_counts().items()]
@@ -105,7 +108,7 @@ def share_bar(part: int, whole: int) -> ShareBar:
     return ShareBar(part, whole, f"{part:,} of {whole:,}")
 
 
-def warning_filter_values(frame: pd.DataFrame) -> np.ndarray:
+def warning_filter_values(frame: "pd.DataFrame") -> np.ndarray:
     """Return the value of the page's filter `warning` for each row of a frame of results; '' without a
     hazard.
     """

@@ -1,9 +1,9 @@
 """What a report says of each family of scenarios: its concrete scenarios, shares over them, and weights."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.errors import MutatorError
@@ -20,6 +20,9 @@ from mutator.store.planned_scenarios import concrete_scenarios_of
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FamilyResults:
@@ -28,7 +31,7 @@ class FamilyResults:
     """
 
     facts: FamilyFacts
-    scenarios: pd.DataFrame
+    scenarios: "pd.DataFrame"
     shares: list[FamilyShare]
     frequency_source: str
 

@@ -5,8 +5,7 @@ against the run before.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator._common.message_text import counted
 from mutator.config.yaml_files import load_yaml
@@ -20,6 +19,9 @@ from mutator.statistics.bootstrap_median_intervals import median_interval
 from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MOST_LISTED_CHANGES = 3  # maximum number of new hazards, and of those gone, that are listed
 
@@ -54,7 +56,7 @@ def worst_record(run: ReportedRun) -> Record | None:
     return run.records.get(row.experiment_id) if row else None
 
 
-def key_numbers(frame: pd.DataFrame, *, has_alerts: bool) -> tuple[KeyNumber, ...]:
+def key_numbers(frame: "pd.DataFrame", *, has_alerts: bool) -> tuple[KeyNumber, ...]:
     """Return how many faults acted, how many of these led to a hazard, how many hazards were silent, and how
     soon the hazard came. `frame` has the usable experiments, with their `warning`. A target without alerts
     has the share of faults that changed an actuator instead of silent hazards.
@@ -78,8 +80,8 @@ def key_numbers(frame: pd.DataFrame, *, has_alerts: bool) -> tuple[KeyNumber, ..
 
 
 def _share_number(
-    part: pd.DataFrame,
-    whole: pd.DataFrame,
+    part: "pd.DataFrame",
+    whole: "pd.DataFrame",
     plural_noun: str,
     verb: str,
     filters: Mapping[str, tuple[str, ...] | list[str]],
@@ -99,7 +101,7 @@ def _share_number(
     )
 
 
-def _time_number(hazards: pd.DataFrame) -> KeyNumber:
+def _time_number(hazards: "pd.DataFrame") -> KeyNumber:
     times = (hazards["t_hazard"] - hazards["t_activation"]).dropna().round(6)
     meaning = "from fault to hazard (median)"
     if times.empty:

@@ -3,8 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from math import inf
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator.outcomes.fault_paths import UntimedPath
 from mutator.report.answer_parts import (
@@ -21,11 +20,14 @@ from mutator.report.answer_parts import (
 from mutator.report.fault_path_page_data import RunFaultPaths, link_name
 from mutator.report.most_dangerous_experiments_answer import NO_CLASS_VALUE, SEVERITY_COLUMN
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 MOST_FAULT_TYPES = 5  # maximum number of fault types listed
 
 
 def fix_first_answer(
-    frame: pd.DataFrame,
+    frame: "pd.DataFrame",
     paths: RunFaultPaths | None,
     severity_labels: Mapping[str, str],
     *,
@@ -73,21 +75,21 @@ def fix_first_answer(
     )
 
 
-def _severity_classes(hazards: pd.DataFrame) -> list[str]:
+def _severity_classes(hazards: "pd.DataFrame") -> list[str]:
     """Return the severity classes that occur, highest first; no class ('') is last."""
     return sorted(hazards[SEVERITY_COLUMN].unique(), reverse=True) if SEVERITY_COLUMN in hazards else [""]
 
 
-def _hazards_of_class(hazards: pd.DataFrame, name: str) -> pd.DataFrame:
+def _hazards_of_class(hazards: "pd.DataFrame", name: str) -> "pd.DataFrame":
     return hazards[hazards[SEVERITY_COLUMN] == name] if SEVERITY_COLUMN in hazards else hazards
 
 
-def _times_to_hazard(hazards: pd.DataFrame) -> pd.Series:
+def _times_to_hazard(hazards: "pd.DataFrame") -> "pd.Series":
     """Return the times from activation to hazard, s."""
     return hazards["t_hazard"] - hazards["t_activation"]
 
 
-def _fault_types_in_order(hazards: pd.DataFrame, classes: Sequence[str]) -> list[str]:
+def _fault_types_in_order(hazards: "pd.DataFrame", classes: Sequence[str]) -> list[str]:
     groups = {str(kind): group for kind, group in hazards.groupby("kind")}
     key = {
         kind: (
@@ -102,7 +104,7 @@ def _fault_types_in_order(hazards: pd.DataFrame, classes: Sequence[str]) -> list
 
 def _rule_paragraph(
     order: Sequence[str],
-    counted_hazards: pd.DataFrame,
+    counted_hazards: "pd.DataFrame",
     classes: Sequence[str],
     severity_labels: Mapping[str, str],
     plural_noun: str,
@@ -129,8 +131,8 @@ def _rule_paragraph(
 
 def _fault_type_row(
     kind: str,
-    results_of_type: pd.DataFrame,
-    counted_hazards: pd.DataFrame,
+    results_of_type: "pd.DataFrame",
+    counted_hazards: "pd.DataFrame",
     classes: Sequence[str],
     severity_labels: Mapping[str, str],
     list_filter: Mapping[str, Sequence[str]],
@@ -166,7 +168,7 @@ def _fault_type_row(
 
 
 def _component_that_passed_most(
-    kind: str, hazards: pd.DataFrame, list_filter: Mapping[str, Sequence[str]], paths: RunFaultPaths
+    kind: str, hazards: "pd.DataFrame", list_filter: Mapping[str, Sequence[str]], paths: RunFaultPaths
 ) -> AnswerCell:
     """Return the component that most often let this fault type through to the first changed actuator."""
     passed: Counter[str] = Counter()
@@ -184,13 +186,13 @@ def _component_that_passed_most(
     return PageLink(f"{paths.component_label(component)}: {passed[component]} of {len(hazards)}", fragment)
 
 
-def _untimed_path_counts(frame: pd.DataFrame, paths: RunFaultPaths) -> Iterator[tuple[UntimedPath, int]]:
+def _untimed_path_counts(frame: "pd.DataFrame", paths: RunFaultPaths) -> Iterator[tuple[UntimedPath, int]]:
     for code, count in frame["untimed_path"].value_counts(sort=False).items():
         if (place := int(str(code))) >= 0:
             yield paths.distinct_untimed_paths[place], int(count)
 
 
-def _component_that_stopped_most(kind: str, active: pd.DataFrame, paths: RunFaultPaths) -> AnswerCell:
+def _component_that_stopped_most(kind: str, active: "pd.DataFrame", paths: RunFaultPaths) -> AnswerCell:
     """Return the component that stopped most faults of this type, a candidate for stopping the rest."""
     stopped: Counter[str] = Counter()
     for untimed_path, count in _untimed_path_counts(active, paths):

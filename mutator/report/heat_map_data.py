@@ -3,16 +3,18 @@ have the same names as in web/report/heat.js.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL
 from mutator.targets.hazard_severity import SEVERITY_CLASSES
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 HeatMapCells = list[list[Any]]  # by row; each cell has a count or value, and its base (the number of runs)
 
@@ -21,6 +23,8 @@ def build_heat_map(run: ReportedRun) -> dict[str, Any]:
     """Return the fault types, scenarios (those of a family are one), and cells by measure. The last row and
     column are totals.
     """
+    import pandas as pd
+
     frame = run.frame
     columns = (frame["kind"], families_or_scenarios_of(frame))
     kinds, scenarios = (sorted(map(str, column.unique())) for column in columns)
@@ -45,9 +49,10 @@ def build_heat_map(run: ReportedRun) -> dict[str, Any]:
 
 
 def _share_and_base_row_masks(
-    frame: pd.DataFrame, *, has_alerts: bool
+    frame: "pd.DataFrame", *, has_alerts: bool
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     """Yield the name of each share, the rows that it counts, and the rows in its base."""
+    import pandas as pd
 
     def flags(name: str) -> np.ndarray:
         return frame[name].to_numpy(dtype=bool)

@@ -2,9 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import isnan
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from mutator._common.phrase_texts import measured_number_text
 from mutator.report.answer_parts import (
@@ -22,6 +20,9 @@ from mutator.report.answer_parts import (
 from mutator.results.worst_first_ranking import causes_of, worst_of_each_cause
 from mutator.targets.stored_target_facts import MetricFacts
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 MOST_LISTED = 10  # maximum number of causes listed as most dangerous
 MOST_FAULT_TYPES = 6  # maximum number of fault types listed
 MARGIN_PREFIX = "margin_"  # prefix of the columns of hazard margins
@@ -31,7 +32,7 @@ NO_CLASS_VALUE = "no class"  # the page filter's name for an empty severity
 
 
 def most_dangerous_answer(
-    frame: pd.DataFrame,
+    frame: "pd.DataFrame",
     metrics: Sequence[MetricFacts],
     severity_labels: Mapping[str, str],
     *,
@@ -72,13 +73,13 @@ def most_dangerous_answer(
     )
 
 
-def worst_hazard_ids(frame: pd.DataFrame) -> list[str]:
+def worst_hazard_ids(frame: "pd.DataFrame") -> list[str]:
     """Ids of the experiments that `dangerous` can list, sorted by `place`."""
     ranked = frame[frame["outcome"] == "hazard"].sort_values("place")
     return [str(name) for name in worst_of_each_cause(ranked)[0]["experiment_id"].head(MOST_LISTED)]
 
 
-def _list_links(ranked: pd.DataFrame) -> tuple[PageLink, ...]:
+def _list_links(ranked: "pd.DataFrame") -> tuple[PageLink, ...]:
     if ranked.empty:
         return ()
     links = [PageLink(f"All {len(ranked):,} hazards", filtered_list_fragment(HAZARD_FILTER, "rank"))]
@@ -98,12 +99,12 @@ def _list_links(ranked: pd.DataFrame) -> tuple[PageLink, ...]:
     return tuple(links)
 
 
-def find_contact_column(frame: pd.DataFrame) -> str:
+def find_contact_column(frame: "pd.DataFrame") -> str:
     """Return the column that measures a contact: delta-v, contact speed; '' if the target has neither."""
     return next((name for name in ("delta_v", "contact_speed") if name in frame), "")
 
 
-def _describe_severities(hazards: pd.DataFrame, labels: Mapping[str, str]) -> str:
+def _describe_severities(hazards: "pd.DataFrame", labels: Mapping[str, str]) -> str:
     """`2 possibly fatal (severity S3), 4 light (severity S1), 14 without a class`."""
     counts = hazards[SEVERITY_COLUMN].value_counts()
     parts = [
@@ -116,7 +117,7 @@ def _describe_severities(hazards: pd.DataFrame, labels: Mapping[str, str]) -> st
 
 
 def _worst_table(
-    ranked: pd.DataFrame, units: Mapping[str, str], severity_labels: Mapping[str, str], *, has_alerts: bool
+    ranked: "pd.DataFrame", units: Mapping[str, str], severity_labels: Mapping[str, str], *, has_alerts: bool
 ) -> AnswerTable:
     """Return the worst experiment of each cause, with its measures of danger and the number of others."""
     ranked, more = worst_of_each_cause(ranked)

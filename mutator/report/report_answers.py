@@ -1,8 +1,6 @@
 """Answers to a reader's first questions. Each answer links to its experiments in the list."""
 
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from mutator._common.message_text import counted
 from mutator.engines.engine_jobs import RunMode
@@ -31,6 +29,9 @@ from mutator.report.reported_run import ReportedRun
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, rows_of
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 MOST_FAULT_TYPES = 6  # maximum number of fault types that an answer lists
 
 
@@ -51,7 +52,7 @@ def build_answers(run: ReportedRun) -> tuple[ReportAnswer, ...]:
     return tuple(answers)
 
 
-def _frame_for_answers(run: ReportedRun) -> pd.DataFrame:
+def _frame_for_answers(run: ReportedRun) -> "pd.DataFrame":
     """Return the usable experiments with rank, path and warning. Those that answers can list also have
     words.
     """
@@ -86,7 +87,7 @@ def _describe_first_alert(row: ResultRow) -> str:
     return f"{row.alerts[0]}, {row.reaction_time:.1f} s"
 
 
-def silent_hazards_answer(frame: pd.DataFrame, alerts_caveat: str = "") -> ReportAnswer:
+def silent_hazards_answer(frame: "pd.DataFrame", alerts_caveat: str = "") -> ReportAnswer:
     """Say which hazards were silent. `alerts_caveat` is about alerts that were not observed."""
     hazards = frame[frame["outcome"] == "hazard"]
     silent = hazards[hazards["warning"] != ALERT_BEFORE_HAZARD]
@@ -142,7 +143,7 @@ def _describe_truncation(count: int, plural_noun: str) -> str:
     )
 
 
-def tolerated_faults_answer(frame: pd.DataFrame) -> ReportAnswer:
+def tolerated_faults_answer(frame: "pd.DataFrame") -> ReportAnswer:
     """Say how many activated faults led to no hazard, and which fault types never led to one."""
     active = frame[frame["is_activated"]]
     without_hazard = active[active["outcome"].isin(["masked", "sdc"])]
@@ -179,7 +180,7 @@ def tolerated_faults_answer(frame: pd.DataFrame) -> ReportAnswer:
     )
 
 
-def time_spent_answer(frame: pd.DataFrame, timings: pd.DataFrame) -> ReportAnswer:
+def time_spent_answer(frame: "pd.DataFrame", timings: "pd.DataFrame") -> ReportAnswer:
     """Say how much CPU time the experiments took, and why some took none."""
     cpu = frame["experiment_id"].map(timings.set_index("experiment_id")["cpu_s"]).astype(float)
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
@@ -209,7 +210,7 @@ def time_spent_answer(frame: pd.DataFrame, timings: pd.DataFrame) -> ReportAnswe
     )
 
 
-def _describe_unsimulated(frame: pd.DataFrame, cpu: pd.Series, timings: pd.DataFrame) -> str:
+def _describe_unsimulated(frame: "pd.DataFrame", cpu: "pd.Series", timings: "pd.DataFrame") -> str:
     rest = frame["experiment_id"][~(cpu > 0)]
     golden = timings[timings["engine"] == RunMode.GOLDEN_REUSED.value]
     idle = int(rest.isin(golden["experiment_id"]).sum())

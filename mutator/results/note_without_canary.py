@@ -1,15 +1,18 @@
 """What the runs of a campaign without a canary say about whether a hazard can be reached."""
 
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator.model import Outcome
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 _NO_CANARY = "Without a canary, nothing but these runs shows that a hazard can be reached"
 
 
-def no_canary_note(folder: RunFolder, results: pd.DataFrame) -> str:
+def no_canary_note(folder: RunFolder, results: "pd.DataFrame") -> str:
     """Return the first line of results and report, with the first experiment of the plan that reached a
     hazard; '' if the campaign has a canary. `results` has a row for each experiment, in plan order.
     """

@@ -6,20 +6,23 @@ medians of all draws. The seed is fixed.
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from mutator.statistics.paired_statistics import PairedDifference
 from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 RESAMPLE_COUNT = 999  # fewer than for rates, because each draw of a median goes through all runs
 _RESAMPLING_SEED = 1  # fixed, so that equal results give equal tables
 _MOST_BATCH_CELLS = 500_000  # maximum number of cells in one batch of draws, to limit memory
-_MIN_BLOCK_SIZE = 256  # minimum number of values in a block
+_MIN_BLOCK_SIZE = 256  # minimum number of values in a block, if there are as many
 
 
-def median_interval(values: pd.Series, cluster: pd.Series) -> tuple[float, float]:
+def median_interval(values: "pd.Series", cluster: "pd.Series") -> tuple[float, float]:
     """Return the interval of the median of `values`, which must not contain NaN. `cluster` has the cluster of
     each value.
 
@@ -28,7 +31,7 @@ def median_interval(values: pd.Series, cluster: pd.Series) -> tuple[float, float
     return _bootstrap_interval([values.to_numpy(dtype=float)], cluster)
 
 
-def median_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> PairedDifference:
+def median_difference(first: "pd.Series", second: "pd.Series", cluster: "pd.Series") -> PairedDifference:
     """Return the median of the second values minus that of the first, with its interval; draws keep pairs
     together. NaN without pairs. The interval is NaN in the same cases as in `median_interval`.
     """
@@ -39,8 +42,10 @@ def median_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -
     return PairedDifference(difference=float(np.median(after) - np.median(before)), low=low, high=high)
 
 
-def _bootstrap_interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, float]:
+def _bootstrap_interval(samples: list[np.ndarray], cluster: "pd.Series") -> tuple[float, float]:
     """Return the interval of the median of the first sample, minus that of the second if there is one."""
+    import pandas as pd
+
     codes, names = pd.factorize(cluster)
     is_constant = (
         np.ptp(samples[0] if len(samples) == 1 else samples[0] - samples[1]) == 0 if codes.size else True
@@ -62,7 +67,7 @@ def _block_size(clusters: int, runs: int) -> int:
     """Return the number of values per block. It balances two costs: a product for each block and cluster, and
     work on each value in the median's block, which is about 50 times as slow.
     """
-    return max(_MIN_BLOCK_SIZE, math.isqrt(clusters * runs // 50))
+    return min(runs, max(_MIN_BLOCK_SIZE, math.isqrt(clusters * runs // 50)))
 
 
 def draw_cluster_counts(cluster_count: int, other_cells_per_draw: int) -> Iterator[np.ndarray]:

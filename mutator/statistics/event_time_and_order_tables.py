@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import astuple
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.statistics import event_time_statistics
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _ALERT_NOTE = (
     " Alert to hazard: only if the alert came first. Hazards that would follow after the end of the run are "
@@ -17,7 +19,7 @@ _ALERT_NOTE = (
 
 
 def propagation_sheet(
-    frame: pd.DataFrame, published: PublishedCounts | None, *, has_alerts: bool = True
+    frame: "pd.DataFrame", published: PublishedCounts | None, *, has_alerts: bool = True
 ) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for method, scenario, group in _groups_with_totals(frame):
@@ -46,7 +48,7 @@ def propagation_sheet(
 
 
 def alert_to_hazard_sheet(
-    frame: pd.DataFrame, end_by_scenario: Mapping[str, float], driver_reaction_s: float
+    frame: "pd.DataFrame", end_by_scenario: Mapping[str, float], driver_reaction_s: float
 ) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for method, scenario, group in _groups_with_totals(frame):
@@ -81,7 +83,7 @@ def alert_to_hazard_sheet(
 
 
 def alerts_before_hazards_sheet(
-    frame: pd.DataFrame, first_alerts_by_hazard_run: event_time_statistics.FirstAlertsByHazardRun
+    frame: "pd.DataFrame", first_alerts_by_hazard_run: event_time_statistics.FirstAlertsByHazardRun
 ) -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for method, group in frame.groupby("method"):
@@ -99,7 +101,7 @@ def alerts_before_hazards_sheet(
     )
 
 
-def hazard_orders_sheet(frame: pd.DataFrame) -> Sheet:
+def hazard_orders_sheet(frame: "pd.DataFrame") -> Sheet:
     lines: list[tuple[SheetCell, ...]] = []
     for (method, module), group in frame.groupby(["method", "module"]):
         lines += [
@@ -115,7 +117,7 @@ def hazard_orders_sheet(frame: pd.DataFrame) -> Sheet:
     )
 
 
-def _groups_with_totals(frame: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+def _groups_with_totals(frame: "pd.DataFrame") -> Iterator[tuple[str, str, "pd.DataFrame"]]:
     """Yield the groups by method and scenario; scenarios of a family are one group. After the scenarios of a
     method comes its total.
     """

@@ -9,13 +9,15 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL, Share, share_with_interval
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FirstAlertsByHazardRun = Mapping[str, tuple[tuple[str, float], ...]]
 _SHARE_TOLERANCE = (
@@ -61,7 +63,7 @@ class AlertToHazardTimes:
     )
 
 
-def spread_of_times(times: pd.Series) -> TimeSpread:
+def spread_of_times(times: "pd.Series") -> TimeSpread:
     present = times.dropna()
     if present.empty:
         return TimeSpread(
@@ -77,7 +79,7 @@ def spread_of_times(times: pd.Series) -> TimeSpread:
     )
 
 
-def share_of_hazards_within(frame: pd.DataFrame, time_s: float) -> Share:
+def share_of_hazards_within(frame: "pd.DataFrame", time_s: float) -> Share:
     """Return the share, among the runs with a hazard after the activation, of those whose first hazard came
     no later than `time_s` after it.
     """
@@ -85,7 +87,7 @@ def share_of_hazards_within(frame: pd.DataFrame, time_s: float) -> Share:
     return share_with_interval(int((times.round(6) <= time_s).sum()), len(times))
 
 
-def propagation_spreads_by_step(frame: pd.DataFrame) -> dict[str, TimeSpread]:
+def propagation_spreads_by_step(frame: "pd.DataFrame") -> dict[str, TimeSpread]:
     """Return the times from activation to the first actuator difference, alert and hazard, and from the first
     alert to the first hazard if the alert came first.
     """
@@ -100,7 +102,7 @@ def propagation_spreads_by_step(frame: pd.DataFrame) -> dict[str, TimeSpread]:
 
 
 def alert_to_hazard_times(
-    frame: pd.DataFrame, end_by_scenario: Mapping[str, float], driver_reaction_s: float
+    frame: "pd.DataFrame", end_by_scenario: Mapping[str, float], driver_reaction_s: float
 ) -> AlertToHazardTimes:
     """Return the Kaplan-Meier estimate (statsmodels) over the runs with an alert before any hazard.
 
@@ -168,7 +170,7 @@ def _median_time_interval(curve: Any) -> tuple[float, float]:
 
 
 def alert_first_share_by_hazard_and_alert(
-    frame: pd.DataFrame, first_alerts_by_hazard_run: FirstAlertsByHazardRun
+    frame: "pd.DataFrame", first_alerts_by_hazard_run: FirstAlertsByHazardRun
 ) -> dict[tuple[str, str], Share]:
     """Return, by (hazard, alert), the share of the runs with this hazard in which the alert came first. The
     names `any` and `none` mean at least one alert and no alert.
@@ -193,7 +195,7 @@ def alert_first_share_by_hazard_and_alert(
     return shares
 
 
-def run_count_by_hazard_order(frame: pd.DataFrame) -> dict[str, int]:
+def run_count_by_hazard_order(frame: "pd.DataFrame") -> dict[str, int]:
     """Return the number of runs with each order of hazards: `A`, `A then B`, `A with B`."""
     names = hazard_names(frame)
     rows = frame[frame["is_hazard"]]
@@ -210,6 +212,6 @@ def _describe_order(times: Mapping[str, float]) -> str:
     return text
 
 
-def _alert_first_flags(frame: pd.DataFrame) -> pd.Series:
+def _alert_first_flags(frame: "pd.DataFrame") -> "pd.Series":
     """Whether an alert came before the first hazard. An alert at the same time is no warning."""
     return frame["t_alert"] < frame["t_hazard"]

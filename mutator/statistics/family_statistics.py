@@ -6,9 +6,9 @@ Experiments of one scenario are alike, so intervals resample whole scenarios.
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from mutator.families.family_facts import FamilyFacts, merged_parameters
 from mutator.model import ConcreteScenario, Outcome
@@ -17,6 +17,9 @@ from mutator.statistics.fault_free_drive_tables import JudgedDrive
 from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL, Share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 GOLDEN_HAZARDS_COLUMN, GOLDEN_METRIC_PREFIX = "golden_hazards", "golden_"
 _OUTCOMES = tuple(outcome.value for outcome in Outcome if outcome is not Outcome.NOT_JUDGED)
@@ -49,15 +52,17 @@ class FamilyShare:
 def scenarios_frame(
     families: Sequence[FamilyFacts],
     scenarios: Iterable[ConcreteScenario],
-    usable: pd.DataFrame,
+    usable: "pd.DataFrame",
     drives: Iterable[JudgedDrive] = (),
-) -> pd.DataFrame:
+) -> "pd.DataFrame":
     """Return a frame with a row for each concrete scenario, indexed by name: family, label, parameters, what
     its golden run did (if known), and counts of its experiments.
 
     `usable` are the experiments from `prepare_results`, `drives` the golden runs. With several of a scenario,
     hazards are those of any, and metrics those of the run with the fewest changes.
     """
+    import pandas as pd
+
     rows = {scenario.name: _scenario_cells(families, scenario) for scenario in scenarios}
     frame = pd.DataFrame.from_dict(rows, orient="index")
     golden = _golden_cells(drive for drive in drives if drive.golden_run.scenario in rows)
@@ -90,8 +95,10 @@ def _golden_cells(drives: Iterable[JudgedDrive]) -> dict[str, dict[str, object]]
     return {name: {GOLDEN_HAZARDS_COLUMN: ";".join(hazards[name]), **cells[name]} for name in cells}
 
 
-def _counts_by_scenario(usable: pd.DataFrame) -> dict[str, pd.Series]:
+def _counts_by_scenario(usable: "pd.DataFrame") -> dict[str, "pd.Series"]:
     """Return the number of experiments of each scenario: all, and by outcome and hazard."""
+    import pandas as pd
+
     flags = {"experiments": pd.Series(True, index=usable.index)}
     flags |= {outcome: usable["outcome"] == outcome for outcome in _OUTCOMES}
     flags[_FAILED] = usable["outcome"] == ""
@@ -100,7 +107,7 @@ def _counts_by_scenario(usable: pd.DataFrame) -> dict[str, pd.Series]:
 
 
 def family_shares(
-    of_family: pd.DataFrame, hazards: Sequence[str], weights: np.ndarray | None = None
+    of_family: "pd.DataFrame", hazards: Sequence[str], weights: np.ndarray | None = None
 ) -> list[FamilyShare]:
     """Return the shares of a family's experiments by outcome and hazard, given its rows of `scenarios_frame`,
     perhaps with a weight for each. Scenarios without experiments do not count.

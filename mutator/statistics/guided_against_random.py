@@ -7,15 +7,17 @@ runs as independent, so `resampled_rate_difference` draws whole faults instead.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import pandas as pd
 
 from mutator.statistics.paired_statistics import PairCounts, resampled_interval
 from mutator.statistics.paired_statistics import mcnemar_test as exact_mcnemar
 from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL
 from mutator.statistics.tallies import Tally
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RateBase = Literal["activated", "injected"]
 RATE_BASES: tuple[RateBase, ...] = ("activated", "injected")
@@ -91,8 +93,6 @@ def strata_with_both_methods(
 
 def pool_odds_ratios(parts: Sequence[FaultTypeStratum]) -> PooledOddsRatio:
     """Compare the odds of a hazard in guided and random runs, stratified by fault type (statsmodels)."""
-    from statsmodels.stats.contingency_tables import StratifiedTable  # type: ignore[import-untyped]
-
     informative = [
         s for s in parts if 0 < s.guided_hazards + s.random_hazards < s.guided_runs + s.random_runs
     ]
@@ -106,6 +106,8 @@ def pool_odds_ratios(parts: Sequence[FaultTypeStratum]) -> PooledOddsRatio:
             p_of_equal_odds_ratios=nan,
             stratum_count=len(parts),
         )
+    from statsmodels.stats.contingency_tables import StratifiedTable  # type: ignore[import-untyped]
+
     table = StratifiedTable([np.array(stratum.contingency_table) for stratum in informative])
     with np.errstate(all="ignore"):  # an odds ratio of 0 or infinity has no finite interval
         low, high = table.oddsratio_pooled_confint(alpha=1 - CONFIDENCE_LEVEL)
@@ -138,7 +140,7 @@ def holm_adjusted(p_values: Sequence[float]) -> tuple[float, ...]:
     return tuple(adjusted)
 
 
-def matched_pairs(frame: pd.DataFrame) -> pd.DataFrame:
+def matched_pairs(frame: "pd.DataFrame") -> "pd.DataFrame":
     """Pair each guided run with the random run of the same fault, scenario, context row and seed.
 
     Columns end in `_guided` and `_random`. Runs without a partner (unfinished or failed) are left out.
@@ -154,18 +156,18 @@ def matched_pairs(frame: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def mcnemar_of_pairs(paired: pd.DataFrame) -> PairCounts:
+def mcnemar_of_pairs(paired: "pd.DataFrame") -> PairCounts:
     return exact_mcnemar(paired["is_hazard_guided"], paired["is_hazard_random"])
 
 
-def resampled_rate_difference(frame: pd.DataFrame, base: RateBase) -> HazardRateDifference:
+def resampled_rate_difference(frame: "pd.DataFrame", base: RateBase) -> HazardRateDifference:
     data = _counts_by_fault(frame[frame["is_activated"]] if base == "activated" else frame)
     difference = float(_rate_difference(*data))
     low, high = (math.nan, math.nan) if math.isnan(difference) else resampled_interval(data, _rate_difference)
     return HazardRateDifference(difference=difference, low=low, high=high, fault_count=len(data[0]))
 
 
-def _counts_by_fault(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:
+def _counts_by_fault(frame: "pd.DataFrame") -> tuple[Any, Any, Any, Any]:
     """Count, for each fault: guided hazards, random hazards, guided runs, random runs."""
     faults = sorted(frame["fault_id"].unique())
     guided, random = frame["method"] == GUIDED, frame["method"] == RANDOM

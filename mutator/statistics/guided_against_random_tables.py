@@ -1,6 +1,6 @@
 """Tables that compare guided with random triggers."""
 
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random import RATE_BASES, RateBase
@@ -10,8 +10,11 @@ from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
 from mutator.statistics.tallies import tally_by_fault_type
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-def hazard_odds_sheet(frame: pd.DataFrame, published: PublishedCounts | None) -> Sheet:
+
+def hazard_odds_sheet(frame: "pd.DataFrame", published: PublishedCounts | None) -> Sheet:
     sources = counts_by_source(published, tally_by_fault_type(frame))
     lines: list[tuple[SheetCell, ...]] = []
     for base in RATE_BASES:
@@ -49,14 +52,14 @@ def hazard_odds_sheet(frame: pd.DataFrame, published: PublishedCounts | None) ->
     )
 
 
-def _difference_cells(frame: pd.DataFrame, base: RateBase, source: str) -> tuple[SheetCell, ...]:
+def _difference_cells(frame: "pd.DataFrame", base: RateBase, source: str) -> tuple[SheetCell, ...]:
     if source != THIS_RUN:  # resampling needs single runs, which are not published
         return (None,) * 4
     estimate = guided_against_random.resampled_rate_difference(frame, base)
     return (estimate.difference, estimate.low, estimate.high, estimate.fault_count)
 
 
-def hazards_by_fault_type_sheet(frame: pd.DataFrame, published: PublishedCounts | None) -> Sheet:
+def hazards_by_fault_type_sheet(frame: "pd.DataFrame", published: PublishedCounts | None) -> Sheet:
     sources = counts_by_source(published, tally_by_fault_type(frame))
     lines: list[tuple[SheetCell, ...]] = []
     for base in RATE_BASES:
@@ -79,7 +82,7 @@ def hazards_by_fault_type_sheet(frame: pd.DataFrame, published: PublishedCounts 
     )
 
 
-def matched_pairs_sheet(frame: pd.DataFrame) -> Sheet:
+def matched_pairs_sheet(frame: "pd.DataFrame") -> Sheet:
     paired = guided_against_random.matched_pairs(frame)
     lines: list[tuple[SheetCell, ...]] = []
     for selection, selected in (

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator.statistics.bootstrap_median_intervals import median_interval
 from mutator.statistics.results_frame import select_common_columns
@@ -11,6 +10,9 @@ from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 from mutator.targets.hazard_severity import SEVERITY_CLASSES, SeverityScale
 from mutator.targets.stored_target_facts import MetricFacts
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 HIGHER_IS_WORSE = "higher"
 TOTAL = "total"
@@ -22,7 +24,7 @@ _INTERVAL_NOTE = (
 )
 
 
-def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[MetricFacts]) -> Sheet:
+def metrics_sheet(frame: "pd.DataFrame", metrics: Sequence[MetricFacts]) -> Sheet:
     """Tabulate the spread of each metric. Without values, the table has no lines."""
     lines: list[tuple[SheetCell, ...]] = []
     activated = frame.loc[frame["is_activated"], ["kind", "fault_id", *(metric.name for metric in metrics)]]
@@ -53,7 +55,7 @@ def describe_severity_classes(scale: SeverityScale | None, names: Sequence[str])
     return f" Severity classes: {', '.join(labels)}." if labels else ""
 
 
-def severity_by_fault_type_sheet(frame: pd.DataFrame, scale_for_note: SeverityScale | None = None) -> Sheet:
+def severity_by_fault_type_sheet(frame: "pd.DataFrame", scale_for_note: SeverityScale | None = None) -> Sheet:
     """Return the shares of activated faults in each severity class, by fault type; no lines without classes.
 
     With a scale, the note gives the classes in words.
@@ -77,7 +79,7 @@ def severity_by_fault_type_sheet(frame: pd.DataFrame, scale_for_note: SeveritySc
 
 
 def times_to_hazard_sheet(
-    frame: pd.DataFrame, was_active_at_hazard: pd.Series, *, has_alerts: bool = True
+    frame: "pd.DataFrame", was_active_at_hazard: "pd.Series", *, has_alerts: bool = True
 ) -> Sheet:
     """Tabulate the times to the first hazard. `was_active_at_hazard` says for each row whether the fault
     still acted then. Without a hazard, the table has no lines.
@@ -119,8 +121,8 @@ def times_to_hazard_sheet(
 
 
 def _values_by_fault_type(
-    frame: pd.DataFrame, values: pd.Series
-) -> Iterator[tuple[str, pd.Series, pd.Series]]:
+    frame: "pd.DataFrame", values: "pd.Series"
+) -> Iterator[tuple[str, "pd.Series", "pd.Series"]]:
     """Yield each fault type with the values of its runs and the faults that they belong to. Runs without a
     value are left out.
     """
@@ -129,7 +131,7 @@ def _values_by_fault_type(
         yield kind, present[group.index], group["fault_id"]
 
 
-def _runs_by_fault_type(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
+def _runs_by_fault_type(frame: "pd.DataFrame") -> Iterator[tuple[str, "pd.DataFrame"]]:
     """Yield the runs of each fault type and, if there are several types, all runs."""
     kinds = [(str(kind), group) for kind, group in frame.groupby("kind")]
     yield from kinds
@@ -137,6 +139,6 @@ def _runs_by_fault_type(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame
         yield TOTAL, frame
 
 
-def _median_cells(values: pd.Series, faults: pd.Series) -> tuple[float, float, float]:
+def _median_cells(values: "pd.Series", faults: "pd.Series") -> tuple[float, float, float]:
     low, high = median_interval(values, faults) if len(values) > 1 else (math.nan, math.nan)
     return float(values.median()), low, high

@@ -6,10 +6,9 @@ activated mutants; others are listed separately.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mutator._common.table_rendering import TextTable
 from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Status
@@ -18,6 +17,9 @@ from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.shares_with_intervals import Share, share_with_interval
 from mutator.statistics.statistics_sheet import Sheet, SheetCell, cell_text
 from mutator.triggers.trigger_kinds import ALWAYS_NAME
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 AlertsByGoldenRun = Mapping[tuple[str, str], frozenset[str]]  # (scenario, seed or "") -> names of alerts
 
@@ -42,14 +44,16 @@ _UNKNOWN_ALERTS_NOTE = " The fault-free runs cannot be read, so alerts are not c
 
 
 def mutant_effect_flags(
-    frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: AlertsByGoldenRun | None
-) -> pd.DataFrame:
+    frame: "pd.DataFrame", faults: Mapping[str, Fault], golden_alerts: AlertsByGoldenRun | None
+) -> "pd.DataFrame":
     """Return a frame with a row for each usable experiment of an operator mutant.
 
     Columns: `mutant` (the fault's id), `operator`, `function` (`path::name`), `fault` (permanent or
     transient), a flag `active`, and a flag for each effect. A crashed or timed-out drive is active. Without
     `golden_alerts`, there is no flag for alerts.
     """
+    import pandas as pd
+
     mutant_runs = frame[frame["module"] == OPERATOR_FAULTS_MODULE]
     is_broken = mutant_runs["status"].isin([Status.CRASHED.value, Status.TIMEOUT.value])
     flags = {
@@ -86,7 +90,7 @@ def function_label(fault: Fault) -> str:
     return f"{location.path}::{location.function}"
 
 
-def _new_alert_flags(mutant_runs: pd.DataFrame, golden_alerts: AlertsByGoldenRun) -> list[bool]:
+def _new_alert_flags(mutant_runs: "pd.DataFrame", golden_alerts: AlertsByGoldenRun) -> list[bool]:
     rows = zip(mutant_runs["scenario"], mutant_runs["seed"].astype(str), mutant_runs["alerts"], strict=True)
     return [
         not golden_alerts.get((scenario, seed), golden_alerts.get((scenario, ""), frozenset())).issuperset(
@@ -97,7 +101,7 @@ def _new_alert_flags(mutant_runs: pd.DataFrame, golden_alerts: AlertsByGoldenRun
 
 
 def mutation_score_sheet(
-    frame: pd.DataFrame,
+    frame: "pd.DataFrame",
     faults: Mapping[str, Fault],
     golden_alerts: AlertsByGoldenRun | None,
     operator_notes: Sequence[str] = (),
@@ -146,7 +150,7 @@ def _short_text(cell: SheetCell) -> str:
     return f"{100 * cell.rate:.1f} % ({100 * cell.low:.0f} to {100 * cell.high:.0f})"
 
 
-def _sheet_lines(drives: pd.DataFrame) -> Iterator[tuple[SheetCell, ...]]:
+def _sheet_lines(drives: "pd.DataFrame") -> Iterator[tuple[SheetCell, ...]]:
     if drives.empty:
         return
     yield from _lines_by_fault_kind(ALL_MUTANTS, drives)
@@ -160,17 +164,17 @@ def _sheet_lines(drives: pd.DataFrame) -> Iterator[tuple[SheetCell, ...]]:
             yield from _lines_by_fault_kind(str(name), group)
 
 
-def _lines_by_fault_kind(name: str, drives: pd.DataFrame) -> Iterator[tuple[SheetCell, ...]]:
+def _lines_by_fault_kind(name: str, drives: "pd.DataFrame") -> Iterator[tuple[SheetCell, ...]]:
     for fault_kind, group in drives.groupby("fault"):
         yield _sheet_line(name, MUTANTS, str(fault_kind), _flags_by_mutant(group))
 
 
-def _flags_by_mutant(drives: pd.DataFrame) -> pd.DataFrame:
+def _flags_by_mutant(drives: "pd.DataFrame") -> "pd.DataFrame":
     flags = [name for name in (_ACTIVE_COLUMN, *_EFFECT_NAMES) if name in drives]
     return drives.groupby("mutant")[flags].any()
 
 
-def _sheet_line(name: str, counted: str, fault_kind: str, flags: pd.DataFrame) -> tuple[SheetCell, ...]:
+def _sheet_line(name: str, counted: str, fault_kind: str, flags: "pd.DataFrame") -> tuple[SheetCell, ...]:
     """Return a line of the sheet. `flags` has a row for each counted item and is indexed by mutant."""
     active = flags[flags[_ACTIVE_COLUMN]]
     effects = [effect for effect in _EFFECT_NAMES if effect in active]

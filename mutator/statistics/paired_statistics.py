@@ -8,12 +8,14 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RESAMPLE_COUNT = 9999  # a draw only adds up one number for each cluster
 _RESAMPLING_SEED = 1  # fixed, so that resampling is deterministic
@@ -59,7 +61,7 @@ class PairedTimes:
     p_value: float
 
 
-def mcnemar_test(first: pd.Series, second: pd.Series) -> PairCounts:
+def mcnemar_test(first: "pd.Series", second: "pd.Series") -> PairCounts:
     """Compare two flags of each pair with McNemar's exact test (statsmodels)."""
     from statsmodels.stats.contingency_tables import (  # type: ignore[import-untyped]
         mcnemar as exact_mcnemar,
@@ -77,7 +79,7 @@ def mcnemar_test(first: pd.Series, second: pd.Series) -> PairCounts:
     )
 
 
-def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> PairedDifference:
+def rate_difference(first: "pd.Series", second: "pd.Series", cluster: "pd.Series") -> PairedDifference:
     """Return the difference of a flag's rates, second minus first, with its `resampled_interval` over
     clusters.
     """
@@ -119,7 +121,7 @@ def _mean_change(changes: Any, pairs: Any, axis: int = -1) -> Any:
     return np.sum(changes, axis=axis) / np.sum(pairs, axis=axis)
 
 
-def paired_times(first: pd.Series, second: pd.Series) -> PairedTimes:
+def paired_times(first: "pd.Series", second: "pd.Series") -> PairedTimes:
     """Compare the times of complete pairs (scipy): medians, the median difference with an exact interval from
     order statistics, and p of Wilcoxon's signed-rank test (NaN if no time differs).
     """
@@ -149,7 +151,7 @@ def paired_times(first: pd.Series, second: pd.Series) -> PairedTimes:
     )
 
 
-def wilcoxon_p(first: pd.Series, second: pd.Series) -> float:
+def wilcoxon_p(first: "pd.Series", second: "pd.Series") -> float:
     """Return the p-value of Wilcoxon's signed-rank test on pairs without NaN; NaN if no pair differs."""
     from scipy.stats import wilcoxon as signed_rank
 

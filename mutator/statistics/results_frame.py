@@ -7,17 +7,19 @@ did not happen.
 """
 
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator.results.outcome_counting import are_usable
 from mutator.results.table_columns import hazard_names_of_frame
 from mutator.results.table_reader import Results
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 _RANDOM_PREFIX = "random/"  # prefix of a random run's trigger: random/C1
 
 
-def load_usable_results(results: Path) -> pd.DataFrame:
+def load_usable_results(results: Path) -> "pd.DataFrame":
     """Load the usable experiments of a run folder, in order, given its results.csv. MutatorError if the
     results.parquet next to it is invalid.
 
@@ -26,7 +28,7 @@ def load_usable_results(results: Path) -> pd.DataFrame:
     return prepare_results(Results(results.parent).frame())
 
 
-def prepare_results(frame: pd.DataFrame) -> pd.DataFrame:
+def prepare_results(frame: "pd.DataFrame") -> "pd.DataFrame":
     """Select the usable experiments of a frame from `Results.frame`, and add the derived columns."""
     usable = are_usable(frame)
     if not usable.all():
@@ -60,7 +62,7 @@ _SHARED_COLUMNS = (
 )
 
 
-def select_common_columns(frame: pd.DataFrame, *more_columns: str) -> pd.DataFrame:
+def select_common_columns(frame: "pd.DataFrame", *more_columns: str) -> "pd.DataFrame":
     """Keep only the columns that most statistics need, and those in `more`. Selecting from a million rows
     with all columns takes seconds.
     """
@@ -69,6 +71,6 @@ def select_common_columns(frame: pd.DataFrame, *more_columns: str) -> pd.DataFra
     return frame[[name for name in frame.columns if name in selected or name.startswith(("t_", "is_"))]]
 
 
-def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
+def hazard_names(frame: "pd.DataFrame") -> tuple[str, ...]:
     """Return the hazards in the table, sorted. A hazard NEAR has a flag `near` and a time `t_near`."""
     return tuple(sorted(hazard_names_of_frame(frame)))

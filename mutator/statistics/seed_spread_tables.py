@@ -5,15 +5,17 @@ how much another campaign with the same number of seeds could differ.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.statistics.statistics_sheet import PercentRate, Sheet, SheetCell
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ALL_FAULTS = "all"  # label of the lines for all faults
 _NOTE = (
@@ -29,12 +31,12 @@ _INJECTED, _ACTIVATED, _HAZARDS = "injected", "activated", "hazards"
 _SHARES_BY_FAULT_TYPE = ((_ACTIVATED, _INJECTED), (_HAZARDS, _ACTIVATED), (_HAZARDS, _INJECTED))
 
 
-def seeds_of(frame: pd.DataFrame) -> list[str]:
+def seeds_of(frame: "pd.DataFrame") -> list[str]:
     """Return the seeds of a frame in numeric order."""
     return list(map(str, sorted(frame["seed"].unique())))
 
 
-def seeds_sheet(frame: pd.DataFrame, *, has_alerts: bool = True) -> Sheet:
+def seeds_sheet(frame: "pd.DataFrame", *, has_alerts: bool = True) -> Sheet:
     """Tabulate each share over all faults and by method. With a single seed, the table has no lines."""
     methods = sorted(map(str, frame["method"].unique()))
     groups = {ALL_FAULTS: np.ones(len(frame), dtype=bool)}
@@ -49,7 +51,7 @@ def seeds_sheet(frame: pd.DataFrame, *, has_alerts: bool = True) -> Sheet:
     )
 
 
-def seeds_by_fault_type_sheet(frame: pd.DataFrame) -> Sheet:
+def seeds_by_fault_type_sheet(frame: "pd.DataFrame") -> Sheet:
     kinds = sorted(map(str, frame["kind"].unique()))
     groups = {name: (frame["kind"] == name).to_numpy() for name in kinds}
     return Sheet(
@@ -61,7 +63,7 @@ def seeds_by_fault_type_sheet(frame: pd.DataFrame) -> Sheet:
     )
 
 
-def _event_and_base_pairs(frame: pd.DataFrame, *, has_alerts: bool) -> list[tuple[str, str]]:
+def _event_and_base_pairs(frame: "pd.DataFrame", *, has_alerts: bool) -> list[tuple[str, str]]:
     """Return the shares to compute, each as (what is counted, the base)."""
     shares = [(_ACTIVATED, _INJECTED), ("manifested", _ACTIVATED), *_SHARES_BY_FAULT_TYPE[1:]]
     shares += [(name, whole) for name in hazard_names(frame) for whole in (_ACTIVATED, _INJECTED)]
@@ -72,7 +74,7 @@ def _event_and_base_pairs(frame: pd.DataFrame, *, has_alerts: bool) -> list[tupl
     return shares
 
 
-def _event_flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
+def _event_flags(frame: "pd.DataFrame") -> dict[str, np.ndarray]:
     hazard, alert = (frame[name].to_numpy(dtype=bool) for name in ("is_hazard", "is_alert"))
     return {
         _INJECTED: np.ones(len(frame), dtype=bool),
@@ -87,8 +89,10 @@ def _event_flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
 
 
 def _sheet_lines(
-    frame: pd.DataFrame, groups: Mapping[str, np.ndarray], shares: Sequence[tuple[str, str]]
+    frame: "pd.DataFrame", groups: Mapping[str, np.ndarray], shares: Sequence[tuple[str, str]]
 ) -> Iterator[tuple[SheetCell, ...]]:
+    import pandas as pd
+
     seeds = seeds_of(frame)
     if len(seeds) < 2:
         return

@@ -1,8 +1,7 @@
 """Select the statistical tables that fit a run's results."""
 
 from collections.abc import Mapping
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator.statistics import event_time_and_order_tables, guided_against_random_tables, summary_tables
 from mutator.statistics.event_time_statistics import FirstAlertsByHazardRun
@@ -12,13 +11,16 @@ from mutator.statistics.results_frame import select_common_columns
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.statistics.tallies import tally_by_fault_type, tally_by_scenario
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 DEFAULT_DRIVER_REACTION_S = (
     1.8  # a driver's reaction time to a visible warning; used if no publication states one
 )
 
 
 def run_sheets(
-    frame: pd.DataFrame,
+    frame: "pd.DataFrame",
     published: PublishedCounts | None,
     first_alerts_by_hazard_run: FirstAlertsByHazardRun | None,
     end_by_scenario: Mapping[str, float] | None,

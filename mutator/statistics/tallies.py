@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from mutator.results.outcome_counting import families_or_scenarios_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +27,7 @@ class Tally:
     alerts_no_hazards: int | None = None
 
 
-def tally_of_runs(frame: pd.DataFrame) -> Tally:
+def tally_of_runs(frame: "pd.DataFrame") -> Tally:
     hazard, alert = frame["is_hazard"], frame["is_alert"]
     return Tally(
         injected=len(frame),
@@ -49,7 +50,7 @@ def sum_tallies(tallies: Iterable[Tally]) -> Tally:
     return Tally(**sums)
 
 
-def tally_by_scenario(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
+def tally_by_scenario(frame: "pd.DataFrame") -> dict[tuple[str, str], Tally]:
     """Return the counts by method and scenario; those of a family count as one."""
     return {
         (str(m), str(s)): tally_of_runs(group)
@@ -57,5 +58,5 @@ def tally_by_scenario(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
     }
 
 
-def tally_by_fault_type(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
+def tally_by_fault_type(frame: "pd.DataFrame") -> dict[tuple[str, str], Tally]:
     return {(str(m), str(k)): tally_of_runs(group) for (m, k), group in frame.groupby(["method", "kind"])}

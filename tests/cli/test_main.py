@@ -82,6 +82,17 @@ def test_list_imports_no_heavy_packages() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_resume_show_and_check_load_packages_for_tables_only_when_they_are_needed() -> None:
+    """Modules that these verbs import name pandas only in annotations, or in functions that need it."""
+    modules = "mutator.api.runs, mutator.checks.library_check, mutator.execution.campaign_running"
+    code = (
+        f"import sys, {modules}, mutator.paper.study;"
+        "print([x for x in ('matplotlib', 'pandas', 'pyarrow', 'scipy') if x in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 def test_python_m_mutator_is_mutator() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "mutator", "lst"], capture_output=True, text=True, check=False

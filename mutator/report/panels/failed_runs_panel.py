@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-from pandas import DataFrame
-
 from mutator._common.table_rendering import TextTable
 from mutator.model import Status
 from mutator.report.panel import Panel, rendered
@@ -31,6 +29,8 @@ def build_failed_runs_panel(run: ReportedRun) -> Panel | None:
     results = run.results[run.results["status"].isin(_FAILURES)]
     if results.empty:
         return None
+    from pandas import DataFrame
+
     sort_keys = {
         "other": results["status"] != Status.HARNESS_ERROR.value,
         **results[["status", "experiment_id"]],

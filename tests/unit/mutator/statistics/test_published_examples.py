@@ -4,12 +4,13 @@ import math
 
 import pandas as pd
 import pytest
+from statsmodels.stats.proportion import proportion_confint
 
 from mutator.paper.measures import estimate_of_difference, mean_time, paired
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random import FaultTypeStratum
 from mutator.statistics.paired_statistics import mcnemar_test, paired_times
-from mutator.statistics.shares_with_intervals import share_with_interval
+from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL, share_with_interval
 
 from . import by_hand
 from .results_frame import results
@@ -20,6 +21,15 @@ def stratum(a: int, b: int, c: int, d: int) -> FaultTypeStratum:
     return FaultTypeStratum(
         fault_type="k", guided_hazards=a, guided_runs=a + b, random_hazards=c, random_runs=c + d
     )
+
+
+@pytest.mark.parametrize("of", [1, 2, 7, 60, 369, 1128, 1_000_003])
+def test_wilson_as_statsmodels(of: int) -> None:
+    """All bytes are those of statsmodels, which the harness does not import for this."""
+    for count in {0, 1, of // 11, of // 3, of // 2, of - 1, of}:
+        low, high = proportion_confint(count, of, alpha=1 - CONFIDENCE_LEVEL, method="wilson")
+        share = share_with_interval(count, of)
+        assert (share.low, share.high) == (round(low, 12), round(high, 12))
 
 
 @pytest.mark.parametrize(
