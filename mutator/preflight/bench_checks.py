@@ -41,8 +41,8 @@ from mutator.store.checks_file import (
 from mutator.store.file_digests import FileDigest
 from mutator.store.golden_files import (
     GOLDEN_FOLDER,
+    GoldenFolders,
     copy_golden,
-    golden_output_folder,
     list_golden_files,
     move_golden,
     stored_golden,
@@ -100,6 +100,7 @@ class BenchChecks:
     goldens: dict[GoldenRun, CheckedGolden] = field(default_factory=dict)
     _stored: set[GoldenRun] = field(default_factory=set)  # which of them are in the run folder
     _variants: set[str] = field(default_factory=set)
+    _folders: GoldenFolders = field(default_factory=GoldenFolders)
     _digests_elsewhere: dict[GoldenRun, str] = field(default_factory=dict)  # of another machine or software
 
     @property
@@ -171,8 +172,9 @@ class BenchChecks:
         """Check the golden runs that are not stored yet, and return where the output of each is."""
         ensure_work_folder(self.scratch_folder)
         new = self.check_goldens(golden_runs)
+        self._folders = GoldenFolders(most_unpacked=len(golden_runs))  # all stay until the next call
         return {
-            golden: golden_output_folder(
+            golden: self._folders.output_folder(
                 (self.pending_folder if golden in new else run) / GOLDEN_FOLDER, golden.key
             )
             for golden in golden_runs

@@ -18,16 +18,16 @@ from mutator.store.trace_packing import pack_file, unpack_file
 
 GOLDEN_FOLDER, PACKED_SUFFIX = "golden", ".packed"  # `allowed_contents` and `file_digests` name them, too
 _OUTPUT_FILE_BLOCK = 0  # the kind of the blocks
-_MOST_UNPACKED = 40  # runs that are unpacked at a time, of 0.6 MB each: more than a worker keeps in memory
+MOST_UNPACKED = 40  # runs that are unpacked at a time, of 0.6 MB each: more than a worker keeps in memory
 
 
 class GoldenFolders:
-    """Finds the output of golden runs. The packed ones that were used last are unpacked into temporary
-    folders in `scratch_folder` (None: the system's).
+    """Finds the output of golden runs. The `most_unpacked` packed ones that were used last are unpacked into
+    temporary folders in `scratch_folder` (None: the system's).
     """
 
-    def __init__(self, scratch_folder: Path | None = None) -> None:
-        self._scratch_folder = scratch_folder
+    def __init__(self, scratch_folder: Path | None = None, most_unpacked: int = MOST_UNPACKED) -> None:
+        self._scratch_folder, self._most_unpacked = scratch_folder, most_unpacked
         self._unpacked: OrderedDict[tuple[Path, int, int, int], ScratchFolder] = OrderedDict()
 
     def output_folder(self, golden: Path, key: str) -> Path:
@@ -43,7 +43,7 @@ class GoldenFolders:
         key = (packed, state.st_ino, state.st_size, state.st_ctime_ns)
         if key not in self._unpacked:
             self._unpacked[key] = self._unpack(packed)
-            if len(self._unpacked) > _MOST_UNPACKED:
+            if len(self._unpacked) > self._most_unpacked:
                 self._unpacked.popitem(last=False)  # its folder is deleted with it
         self._unpacked.move_to_end(key)
         return self._unpacked[key].path

@@ -6,7 +6,6 @@ import pytest
 
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
-from mutator.store import golden_files
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.golden_files import (
     GoldenFolders,
@@ -64,13 +63,10 @@ def test_links_are_not_packed(golden: Path, tmp_path: Path) -> None:
     assert read_golden_files(golden, "B") == FILES
 
 
-def test_unpacked_runs_follow_the_file_and_are_deleted(
-    golden: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(golden_files, "_MOST_UNPACKED", 2)
+def test_unpacked_runs_follow_the_file_and_are_deleted(golden: Path, tmp_path: Path) -> None:
     scratch = tmp_path / "scratch"
     scratch.mkdir()
-    folders = GoldenFolders(scratch)
+    folders = GoldenFolders(scratch, most_unpacked=2)
     first = folders.output_folder(golden, "B")
     assert folders.output_folder(golden, "B") == first
     (golden / "A" / "trace.csv").write_text("other")
