@@ -19,7 +19,7 @@ NAMES_BY_MODULE = {
     "mutator.api.campaigns": ("run",),
     "mutator.api.comparisons": ("RunComparison", "compare", "write_history"),
     "mutator.api.experiments": ("build_experiment",),
-    "mutator.api.explorations": ("Envelopes", "envelope"),
+    "mutator.api.explorations": ("Envelopes", "Findings", "envelope", "search"),
     "mutator.api.experiment_results": ("TraceFrames",),
     "mutator.api.libraries": (
         "check_hazard_analysis",
@@ -44,6 +44,7 @@ NAMES_BY_MODULE = {
     "mutator.errors": ("CheckFailed", "IncompleteRun", "MutatorError", "MutatorWarning"),
     "mutator.execution.session_summary": ("Summary",),
     "mutator.explore.envelope": ("Envelope",),
+    "mutator.explore.finding_search": ("Finding",),
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
     "mutator.onboarding.library_import": ("EntryOutcome", "ImportedEntry", "ImportedLibrary"),

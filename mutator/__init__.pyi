@@ -15,7 +15,9 @@ from mutator.api.comparisons import write_history as write_history
 from mutator.api.experiment_results import TraceFrames as TraceFrames
 from mutator.api.experiments import build_experiment as build_experiment
 from mutator.api.explorations import Envelopes as Envelopes
+from mutator.api.explorations import Findings as Findings
 from mutator.api.explorations import envelope as envelope
+from mutator.api.explorations import search as search
 from mutator.api.libraries import check_hazard_analysis as check_hazard_analysis
 from mutator.api.libraries import check_library as check_library
 from mutator.api.libraries import check_target as check_target
@@ -47,6 +49,7 @@ from mutator.errors import MutatorError as MutatorError
 from mutator.errors import MutatorWarning as MutatorWarning
 from mutator.execution.session_summary import Summary as Summary
 from mutator.explore.envelope import Envelope as Envelope
+from mutator.explore.finding_search import Finding as Finding
 from mutator.exports import Format as Format
 from mutator.model import Experiment as Experiment
 from mutator.model import Fault as Fault
@@ -77,6 +80,8 @@ __all__ = [
     "Envelopes",
     "Experiment",
     "Fault",
+    "Finding",
+    "Findings",
     "Format",
     "Gate",
     "History",
@@ -128,6 +133,7 @@ __all__ = [
     "prune_caches",
     "run",
     "seal",
+    "search",
     "try_fault",
     "verify",
     "write_history",

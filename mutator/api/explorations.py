@@ -1,40 +1,43 @@
 """Explorations: how large and how long a fault may be before a hazard follows."""
 
+import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TypeVar, cast, overload
+from typing import Any, Literal, TypeVar, cast, overload
 
 from mutator._common.argument_checks import check_number, check_whole_number
-from mutator._common.message_text import spelling_suggestion
+from mutator._common.message_text import describe_choices
 from mutator.api.benches import bench_values, distributor_of_cluster, warn_of_end
 from mutator.api.experiments import ExperimentBuilder
-from mutator.api.scenario_choice import ScenarioLike, concrete_scenario_of
+from mutator.api.exploration_planes import chosen_planes
+from mutator.api.scenario_choice import ScenarioLike
 from mutator.api.target_and_fault_selection import (
     SelectedTarget,
     TriggerLike,
     WorkspaceLike,
-    context_or_parsed_trigger,
     open_workspace,
 )
-from mutator.campaigns.exploration_section import ExplorationSection, ExploredPlane
-from mutator.config.units import UNITS
+from mutator.campaigns.exploration_section import STRATEGIES, ExplorationSection, ExploredPlane
+from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import MutatorError
+from mutator.execution.bench import Bench
 from mutator.execution.bench_opening import finishing, opened_bench
+from mutator.execution.distributor_choice import Distributor
 from mutator.execution.session_summary import Summary
 from mutator.explore.envelope import Envelope
-from mutator.explore.exploration_run import run_exploration
-from mutator.explore.lattice import durations_between
-from mutator.explore.plane_building import magnitudes_by_sign
-from mutator.families.family import argument_of
-from mutator.faults.fault_specs import Variant
+from mutator.explore.exploration import Exploration
+from mutator.explore.exploration_run import BuildExperiment, find_drives, run_exploration
+from mutator.explore.finding_search import Finding, FindingSearch, dominated_share
 from mutator.model import Experiment
 from mutator.store.run_progress import ProgressCallback
 
 DEFAULT_POINTS, DEFAULT_LONGEST_S, DEFAULT_OBSERVE_S = 51, 15.0, 15.0
-_NAME, _ABOUT = "envelope", "How large and how long faults may be before a hazard follows."
+_ENVELOPE_PURPOSE = "How large and how long faults may be before a hazard follows."
+_SEARCH_PURPOSE = "Which faults cause hazards, and how small and how short they can be."
+_SEARCHED_MAGNITUDES, _SEARCHED_DURATIONS = 16, 9
 _T = TypeVar("_T")
 
 
@@ -100,34 +103,172 @@ def envelope(
     The run folder `out` is that of a bench. MutatorError for invalid input, and if a golden run never reaches
     a start; CheckFailed if a golden run fails its checks.
     """
-    for name, value in (("points", points), ("search", search), ("workers", workers)):
-        check_whole_number(name, value, least=1)
+    check_whole_number("search", search, least=1)
     check_whole_number("validation", validation)
-    check_whole_number("seed", seed)
-    check_number("longest_s", longest_s, least=0.0)
     check_number("observe_s", observe_s, least=0.0)
-    opened_workspace = open_workspace(workspace)
     selected_target, values = bench_values(
-        opened_workspace, target=target, campaign=campaign, reading=reading, seed=seed
+        open_workspace(workspace), target=target, campaign=campaign, reading=reading, seed=seed
     )
-    builder = ExperimentBuilder(selected_target)
+    planes = chosen_planes(
+        selected_target,
+        _listed(specs),
+        _listed(scenarios),
+        _listed(starts),
+        magnitude_count=points,
+        duration_count=points,
+        longest_s=longest_s,
+        seed=seed,
+    )
     section = ExplorationSection(
-        planes=list(
-            _planes(
-                selected_target,
-                [specs] if isinstance(specs, str) else list(specs),
-                _listed(scenarios),
-                _listed(starts),
-                points=points,
-                longest_s=longest_s,
-                seed=seed,
-            )
-        ),
-        observe_s=float(observe_s),
-        search=search,
-        validation=validation,
+        planes=list(planes), observe_s=float(observe_s), search=search, validation=validation
     )
-    end = None if budget_s is None else time.monotonic() + budget_s
+    with _opened_bench(
+        selected_target,
+        {**values, "name": "envelope", "about": _ENVELOPE_PURPOSE},
+        section,
+        Path(out),
+        workers=workers,
+        engine=engine,
+        reuse=reuse,
+        distributor=distributor_of_cluster(cluster, insecure_network=insecure_network),
+        progress=progress,
+    ) as bench:
+        build = _builder(selected_target, values["reading"])
+        drives = find_drives(bench, selected_target.manifest, section, build)
+        exploration = Exploration(section=section, drives=drives, seed=seed)
+        run_exploration(bench, exploration, build, _within(budget_s))
+    warn_of_end(bench.summary)
+    envelopes = tuple(Envelope(plane) for plane in exploration.planes)
+    return Envelopes(run=Path(out), envelopes=envelopes, summary=bench.summary)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings(Sequence[Finding]):
+    """What a search found: hazards of faults in scenarios from starts on, each with the smallest fault."""
+
+    run: Path  #: the run folder
+    findings: tuple[Finding, ...]  #: the findings, in the order of the planes
+    planes: tuple[ExploredPlane, ...]  #: the planes that were searched
+    #: the sum over planes of the share of cells that are at least as large and long as a hazardous one
+    dominated: float
+    summary: Summary | None  #: the summary of the bench; None if nothing was planned
+
+    def __len__(self) -> int:
+        return len(self.findings)
+
+    @overload
+    def __getitem__(self, index: int) -> Finding: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Finding, ...]: ...
+    def __getitem__(self, index: int | slice) -> Finding | tuple[Finding, ...]:
+        return self.findings[index]
+
+
+def search(
+    specs: str | Sequence[str],
+    scenarios: "ScenarioLike | Sequence[ScenarioLike]",
+    starts: "TriggerLike | Sequence[TriggerLike]",
+    out: str | Path,
+    *,
+    budget: int = 300,
+    strategy: Literal["planes", "random"] = "planes",
+    longest_s: float = DEFAULT_LONGEST_S,
+    target: str | None = None,
+    campaign: str | Path | None = None,
+    reading: str | None = None,
+    seed: int = 0,
+    workers: int = 1,
+    engine: str | None = None,
+    reuse: bool = True,
+    cluster: str | None = None,
+    insecure_network: bool = False,
+    progress: ProgressCallback | None = None,
+    workspace: WorkspaceLike = None,
+) -> "Findings":
+    """Search hazardous faults among all variants, scenarios and starts together, with `budget` runs.
+
+    * `strategy`: `planes` begins with the largest and longest faults, learns which lead to hazards, and goes
+      on to smaller and shorter ones; `random` draws faults, to compare.
+    * The other arguments are as for `envelope`. Each plane has 16 magnitudes and 9 durations.
+
+    The run folder `out` is that of a bench. Errors are as for `envelope`.
+    """
+    check_whole_number("budget", budget, least=1)
+    if strategy not in STRATEGIES:
+        raise MutatorError(repr(strategy), argument="strategy", expected=describe_choices(STRATEGIES))
+    selected_target, values = bench_values(
+        open_workspace(workspace), target=target, campaign=campaign, reading=reading, seed=seed
+    )
+    planes = chosen_planes(
+        selected_target,
+        _listed(specs),
+        _listed(scenarios),
+        _listed(starts),
+        magnitude_count=_SEARCHED_MAGNITUDES,
+        duration_count=_SEARCHED_DURATIONS,
+        longest_s=longest_s,
+        seed=seed,
+    )
+    section = ExplorationSection(planes=list(planes), goal="find", strategy=strategy, budget=budget)
+    with _opened_bench(
+        selected_target,
+        {**values, "name": "search", "about": _SEARCH_PURPOSE},
+        section,
+        Path(out),
+        workers=workers,
+        engine=engine,
+        reuse=reuse,
+        distributor=distributor_of_cluster(cluster, insecure_network=insecure_network),
+        progress=progress,
+    ) as bench:
+        build = _builder(selected_target, values["reading"])
+        drives = find_drives(bench, selected_target.manifest, section, build)
+        searched = FindingSearch(section=section, drives=drives, seed=seed)
+        run_exploration(bench, searched, build, _within(None))
+    warn_of_end(bench.summary)
+    return Findings(
+        run=Path(out),
+        findings=tuple(searched.findings()),
+        planes=tuple(section.planes),
+        dominated=sum(map(dominated_share, searched.planes)),
+        summary=bench.summary,
+    )
+
+
+@contextmanager
+def _opened_bench(
+    selected_target: SelectedTarget,
+    values: Mapping[str, Any],
+    section: ExplorationSection,
+    out: Path,
+    *,
+    workers: int,
+    engine: str | None,
+    reuse: bool,
+    distributor: Distributor | None,
+    progress: ProgressCallback | None,
+) -> Iterator[Bench]:
+    """Open the bench of an exploration, and finish it at the end of the block."""
+    check_whole_number("workers", workers, least=1)
+    check_engine_is_offered(engine)
+    with (
+        opened_bench(
+            selected_target.workspace,
+            out,
+            {**values, "explore": asdict(section)},
+            workers=workers,
+            engine=engine,
+            reuse=reuse,
+            distributor=distributor,
+            notify=progress,
+        ) as bench,
+        finishing(bench),
+    ):
+        yield bench
+
+
+def _builder(selected_target: SelectedTarget, reading: str) -> BuildExperiment:
+    builder = ExperimentBuilder(selected_target)
 
     def build(plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float) -> Experiment:
         return builder.build(
@@ -137,98 +278,17 @@ def envelope(
             value=magnitude,
             hold_s=duration_s,
             seed=plane.seed,
-            reading=values["reading"],
+            reading=reading,
             beyond=True,
         )
 
-    with (
-        opened_bench(
-            opened_workspace,
-            Path(out),
-            {
-                **values,
-                "name": _NAME,
-                "about": "How large and long faults may be.",
-                "explore": asdict(section),
-            },
-            workers=workers,
-            engine=engine,
-            reuse=reuse,
-            distributor=distributor_of_cluster(cluster, insecure_network=insecure_network),
-            notify=progress,
-        ) as bench,
-        finishing(bench),
-    ):
-        exploration = run_exploration(
-            bench,
-            selected_target.manifest,
-            section,
-            seed,
-            build,
-            may_begin=lambda: end is None or time.monotonic() < end,
-        )
-    warn_of_end(bench.summary)
-    envelopes = tuple(Envelope(plane) for plane in exploration.planes)
-    return Envelopes(run=Path(out), envelopes=envelopes, summary=bench.summary)
+    return build
 
 
-def _planes(
-    selected_target: SelectedTarget,
-    names: Sequence[str],
-    scenarios: Sequence[ScenarioLike],
-    starts: Sequence[TriggerLike],
-    *,
-    points: int,
-    longest_s: float,
-    seed: int,
-) -> Iterator[ExploredPlane]:
-    workspace, manifest = selected_target.workspace, selected_target.manifest
-    durations = durations_between(manifest.step_s, longest_s, points, manifest.step_s)
-    triggers = [
-        context_or_parsed_trigger(
-            workspace, str(start), manifest.armed_after_s, manifest.observation.variables
-        )
-        for start in starts
-    ]
-    for spec, variant in _chosen_variants(selected_target, names):
-        unit = UNITS[variant.draw.unit].symbol if variant.draw and variant.draw.unit else ""
-        for magnitudes in magnitudes_by_sign(variant, points):
-            for scenario in scenarios:
-                concrete = concrete_scenario_of(workspace, scenario)
-                for start, trigger in zip(starts, triggers, strict=True):
-                    yield ExploredPlane(
-                        spec=f"{spec}/{variant.name}",
-                        scenario=argument_of(concrete) if concrete else str(scenario),
-                        start=str(start),
-                        condition=trigger.condition,
-                        armed_after_s=trigger.armed_after_s,
-                        magnitudes=magnitudes,
-                        unit=unit,
-                        durations_s=list(durations),
-                        seed=seed,
-                    )
-
-
-def _chosen_variants(selected_target: SelectedTarget, names: Sequence[str]) -> Iterator[tuple[str, Variant]]:
-    """Yield the variants that the names choose, each with its spec's name, in the library's order."""
-    specs = selected_target.workspace.specs()
-    variants = [(spec.name, variant) for spec in specs for variant in spec]
-    full_names = [f"{spec}/{variant.name}" for spec, variant in variants]
-    for name in names:
-        if not any(_is_chosen(full_name, name) for full_name in full_names):
-            raise MutatorError(
-                f"no fault '{name}'",
-                argument="specs",
-                expected="a spec or a variant of the library, such as " + full_names[0],
-                remedy="`mutator list faults` lists them" + spelling_suggestion(name, full_names),
-            )
-    for (spec, variant), full_name in zip(variants, full_names, strict=True):
-        if any(_is_chosen(full_name, name) for name in names):
-            yield spec, variant
-
-
-def _is_chosen(full_name: str, name: str) -> bool:
-    return fnmatchcase(full_name, name) or full_name.startswith(f"{name}/")
+def _within(budget_s: float | None) -> Callable[[], bool]:
+    """Return what says whether less than `budget_s` has passed since now."""
+    end = math.inf if budget_s is None else time.monotonic() + budget_s
+    return lambda: time.monotonic() < end
 
 
 def _listed(values: _T | Sequence[_T]) -> list[_T]:

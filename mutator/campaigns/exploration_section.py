@@ -1,12 +1,14 @@
 """What an exploration drives, as the file of its bench fixes it."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.config.yaml_files import YamlRecord
 from mutator.limits import MOST_LIMIT_OR_TIME
 
 MOST_PLANES = 10_000
+STRATEGIES = ("planes", "random")
 _MOST_POINTS = 200
 
 
@@ -50,12 +52,26 @@ class ExploredPlane:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExplorationSection:
-    """What an exploration drives: planes, and how far each is searched."""
+    """What an exploration drives: planes, and how each is searched."""
 
     __pydantic_config__ = pydantic_mapping_config("An exploration")
 
     planes: list[YamlRecord[ExploredPlane]] = field(
         metadata=yaml_metadata("The planes.", min_length=1, max_length=MOST_PLANES)
+    )
+    goal: Literal["envelope", "find"] = field(
+        default="envelope",
+        metadata=yaml_metadata(
+            "`envelope`: the border of what is survived, in each plane. `find`: as many small and short "
+            "hazardous faults as possible, in all planes together."
+        ),
+    )
+    strategy: Literal["planes", "random"] = field(
+        default="planes",
+        metadata=yaml_metadata("Of `find`: `planes` learns from results; `random` draws cells, to compare."),
+    )
+    budget: int = field(
+        default=300, metadata=yaml_metadata("Of `find`: the number of runs.", ge=1, le=1_000_000)
     )
     observe_s: float = field(
         default=15.0,

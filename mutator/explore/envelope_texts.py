@@ -1,11 +1,13 @@
-"""Envelopes in words and as a table."""
+"""Envelopes and findings in words and as tables."""
 
 from collections.abc import Sequence
 
 from mutator._common.message_text import counted
 from mutator._common.phrase_texts import with_unit
 from mutator._common.table_rendering import TextTable
+from mutator.campaigns.exploration_section import ExploredPlane
 from mutator.explore.envelope import Envelope
+from mutator.explore.finding_search import Finding
 
 TABLE_DURATIONS_S = (0.5, 1.0, 2.0)  # for which the table names the largest magnitude that is survived
 _HEADS = ("fault", "scenario", "from")
@@ -68,6 +70,33 @@ def describe_validation(envelope: Envelope) -> str:
         return f"{runs}; no other cell is called without hazard"
     hazardous = len(envelope.exploration.failures(validation))
     return f"{runs}; {hazardous} of {len(validation.drawn)} drawn cells hazardous"
+
+
+def findings_table(findings: Sequence[Finding], planes: Sequence[ExploredPlane]) -> TextTable:
+    """Return a row for each finding, those of the shortest faults first."""
+    heads = ("fault", "scenario", "from", "hazard", "smallest", "for", "hazard after", "experiment")
+    ordered = sorted(findings, key=lambda finding: (_duration_s(finding, planes), finding.plane))
+    rows = [_finding_row(finding, planes[finding.plane]) for finding in ordered]
+    return TextTable(heads=heads, rows=rows, right_aligned=(4, 5, 6))
+
+
+def _finding_row(finding: Finding, plane: ExploredPlane) -> list[str]:
+    line, duration = finding.cell
+    magnitude = with_unit(f"{plane.magnitudes[line]:g}", plane.unit) if plane.magnitudes else "-"
+    return [
+        plane.spec,
+        plane.scenario,
+        plane.start,
+        finding.hazard,
+        magnitude,
+        f"{plane.durations_s[duration]:g} s",
+        f"{finding.result.time_to_hazard_s:.2f} s",
+        finding.result.experiment_id[:8],
+    ]
+
+
+def _duration_s(finding: Finding, planes: Sequence[ExploredPlane]) -> float:
+    return planes[finding.plane].durations_s[finding.cell[1]]
 
 
 def magnitude_text(envelope: Envelope, magnitude: float | None) -> str:

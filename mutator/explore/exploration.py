@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from mutator.campaigns.exploration_section import ExplorationSection
 from mutator.explore.cell_results import Drive, judge_cell
@@ -63,6 +63,17 @@ class Exploration:
         plane.note(proposal.cell, judge_cell(record, duration_s, plane.drive, self.section.observe_s))
 
 
+class BatchProposer(Protocol):
+    """Proposes batches, each from the records of earlier ones."""
+
+    @property
+    def section(self) -> ExplorationSection: ...
+    @property
+    def drives(self) -> Sequence[Drive]: ...
+    def propose(self) -> list[Proposal]: ...
+    def note(self, proposal: Proposal, record: Record) -> None: ...
+
+
 @dataclass(slots=True)
 class BatchLoop:
     """Keeps batches of an exploration in flight.
@@ -70,7 +81,7 @@ class BatchLoop:
     `begin` is called with the number and the proposals of a batch; `finish` returns its records, in order.
     """
 
-    exploration: Exploration
+    exploration: BatchProposer
     begin: Callable[[int, Sequence[Proposal]], None]
     finish: Callable[[Sequence[Proposal]], Iterable[Record]]
     may_begin: Callable[[], bool] = lambda: True

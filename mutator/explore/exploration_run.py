@@ -7,7 +7,7 @@ from mutator.campaigns.exploration_section import ExplorationSection, ExploredPl
 from mutator.errors import MutatorError
 from mutator.execution.bench import Bench
 from mutator.explore.cell_results import Drive
-from mutator.explore.exploration import BatchLoop, Exploration, Proposal
+from mutator.explore.exploration import BatchLoop, BatchProposer, Proposal
 from mutator.explore.golden_drives import drive_of, load_observed_values
 from mutator.model import Experiment, Record, Status
 from mutator.store.golden_runs import GoldenRun
@@ -23,27 +23,23 @@ class BuildExperiment(Protocol):
 
 
 def run_exploration(
-    bench: Bench,
-    manifest: TargetManifest,
-    section: ExplorationSection,
-    seed: int,
-    build: BuildExperiment,
-    may_begin: Callable[[], bool] = lambda: True,
-) -> Exploration:
+    bench: Bench, proposer: BatchProposer, build: BuildExperiment, may_begin: Callable[[], bool]
+) -> None:
     """Run an exploration, or go on with it, until nothing is proposed or `may_begin` says no.
 
-    MutatorError if a fault never starts, or if the harness failed in an experiment.
+    MutatorError if the harness failed in an experiment.
     """
-    drives = _find_drives(bench, manifest, section, build)
-    exploration = Exploration(section=section, drives=drives, seed=seed)
-    run = _BenchRun(bench, exploration, build)
-    BatchLoop(exploration=exploration, begin=run.begin, finish=run.finish, may_begin=may_begin).run()
-    return exploration
+    run = _BenchRun(bench, proposer, build)
+    BatchLoop(exploration=proposer, begin=run.begin, finish=run.finish, may_begin=may_begin).run()
 
 
-def _find_drives(
+def find_drives(
     bench: Bench, manifest: TargetManifest, section: ExplorationSection, build: BuildExperiment
 ) -> list[Drive]:
+    """Check the golden runs of the planes, and return the drive of each.
+
+    MutatorError if a golden run never reaches the start of a plane; CheckFailed if one fails its checks.
+    """
     # the golden run does not depend on magnitude, start and duration
     samples = [build(p, (*p.magnitudes, None)[0], 0.0, p.durations_s[0]) for p in section.planes]
     folders = bench.checked_golden_folders(samples)
@@ -58,8 +54,8 @@ def _find_drives(
 class _BenchRun:
     """Begins and finishes the batches of an exploration on a bench."""
 
-    def __init__(self, bench: Bench, exploration: Exploration, build: BuildExperiment) -> None:
-        self._bench, self._exploration, self._build = bench, exploration, build
+    def __init__(self, bench: Bench, proposer: BatchProposer, build: BuildExperiment) -> None:
+        self._bench, self._proposer, self._build = bench, proposer, build
         self._experiment_ids: dict[Proposal, str] = {}
         self._records: dict[str, Record] = {}
 
@@ -81,12 +77,11 @@ class _BenchRun:
         return [self._records[experiment_id] for experiment_id in experiment_ids]
 
     def _build_experiment(self, proposal: Proposal) -> Experiment:
-        plane = self._exploration.planes[proposal.plane]
+        plane = self._proposer.section.planes[proposal.plane]
         line, duration = proposal.cell
-        lattice = plane.map.lattice
-        return self._build(
-            plane.plane, lattice.magnitudes[line], plane.drive.start_s, lattice.durations_s[duration]
-        )
+        magnitude = plane.magnitudes[line] if plane.magnitudes else None
+        start_s = self._proposer.drives[proposal.plane].start_s
+        return self._build(plane, magnitude, start_s, plane.durations_s[duration])
 
 
 def _check_harness(record: Record) -> None:

@@ -106,6 +106,32 @@ def test_the_command_says_what_is_survived(toycar: Workspace, tmp_path: Path) ->
     assert values["spec"] == SPEC and len(values["cells"]) == 4
 
 
+@pytest.mark.usefixtures("kept_checks")
+def test_a_search_names_what_it_found(toycar: Workspace, tmp_path: Path) -> None:
+    """A row for each fault, scenario and start with a hazard; the run is sealed, and verified."""
+    words = ["search", "sensor/lane", "sensor/distance/longer", "-s", "A", "-s", "B", "--at", "1"]
+    words += [
+        "--budget",
+        "14",
+        "--longest-s",
+        "3",
+        "--campaign",
+        "small",
+        "--out",
+        str(tmp_path / "run"),
+        "-n",
+        "1",
+    ]
+    words += ["--library", str(toycar.library), "--templates", str(toycar.templates)]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    assert "findings in 4 planes" in result.output and "H3" in result.output and "seal: " in result.output
+    rows = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+    assert {row["scenario"] for row in rows} == {"A", "B"}
+    run = mutator.load_run(tmp_path / "run", workspace=toycar)
+    assert len(run.records) == 14 and run.verify().differences == ()
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [

@@ -1,0 +1,107 @@
+"""The search for findings, on made-up planes."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from mutator.campaigns.exploration_section import ExplorationSection
+from mutator.explore.cell_results import CellResult, CellState, Drive
+from mutator.explore.exploration import BatchLoop, Proposal
+from mutator.explore.finding_search import FindingSearch, dominated_share, smaller_cells
+from mutator.explore.lattice import Lattice, durations_between, magnitudes_between
+from mutator.explore.plane_map import PlaneMap
+from mutator.model import Outcome, Record, Status
+from tests.unit.mutator.explore.made_planes import STEP_S
+from tests.unit.mutator.explore.test_plane_exploration import PLANE
+
+MAGNITUDES = magnitudes_between(0.6, 60.0, 16)
+DURATIONS = durations_between(STEP_S, 15.0, 9, STEP_S)
+FAULTS, SCENARIOS = 12, 5
+PLANES = [
+    replace(
+        PLANE, spec=f"fault/{f}/x", scenario=f"S{s}", magnitudes=list(MAGNITUDES), durations_s=list(DURATIONS)
+    )
+    for f in range(FAULTS)
+    for s in range(SCENARIOS)
+]
+
+
+def is_hazardous(plane: int, magnitude: float, duration_s: float) -> bool:
+    """A third of the faults is dangerous, in all scenarios but one, if they are large and long enough."""
+    fault, scenario = divmod(plane, SCENARIOS)
+    return fault % 3 == 0 and scenario != 4 and magnitude * duration_s >= 20.0 + 10.0 * scenario
+
+
+def record_of(proposal: Proposal) -> Record:
+    line, duration = proposal.cell
+    hazardous = is_hazardous(proposal.plane, MAGNITUDES[line], DURATIONS[duration])
+    return Record(
+        experiment_id=str(proposal),
+        status=Status.OK,
+        outcome=Outcome.HAZARD if hazardous else Outcome.SDC,
+        detail="",
+        tree="",
+        activation=None,
+        t_manifest=None,
+        max_dev=(),
+        hazards=(("H1", 30.0),) if hazardous else (),
+        alerts=(),
+        trace_digest="",
+    )
+
+
+def searched(strategy: str, budget: int = 100) -> tuple[FindingSearch, list[list[Proposal]]]:
+    section = ExplorationSection(planes=PLANES, goal="find", strategy=strategy, budget=budget)  # type: ignore[arg-type]
+    drives = [Drive(start_s=0.0, end_s=60.0, step_s=STEP_S)] * len(PLANES)
+    search = FindingSearch(section=section, drives=drives, seed=1)
+    batches: list[list[Proposal]] = []
+
+    def begin(number: int, batch: Sequence[Proposal]) -> None:
+        batches.append(list(batch))
+
+    BatchLoop(exploration=search, begin=begin, finish=lambda batch: map(record_of, batch)).run()
+    return search, batches
+
+
+def test_the_search_has_more_and_smaller_findings_than_chance() -> None:
+    """With the same 100 runs of 60 planes, of which 16 have a hazard."""
+    (planes, batches), (chance, _) = searched("planes"), searched("random")
+    assert sum(map(len, batches)) == 100
+    assert len(planes.findings()) == 16 >= 2 * len(chance.findings())
+    assert sum(map(dominated_share, planes.planes)) > 1.5 * sum(map(dominated_share, chance.planes))
+
+
+def test_the_same_search_comes_again() -> None:
+    for strategy in ("planes", "random"):
+        assert searched(strategy)[1] == searched(strategy)[1]
+
+
+def test_no_cell_is_driven_twice() -> None:
+    """Also if the budget is larger than the number of cells that are worth a run."""
+    _, batches = searched("planes", budget=2_000)
+    proposals = [proposal for batch in batches for proposal in batch]
+    assert len(set(proposals)) == len(proposals) < 2_000
+
+
+def test_a_finding_is_the_smallest_fault_that_was_driven() -> None:
+    """At the end of the search, a fault of half its magnitude and duration has no hazard."""
+    search, _ = searched("planes", budget=2_000)
+    for finding in search.findings():
+        line, duration = finding.cell
+        assert is_hazardous(finding.plane, MAGNITUDES[line], DURATIONS[duration])
+        assert not is_hazardous(finding.plane, MAGNITUDES[line] / 2, DURATIONS[duration] / 2)
+
+
+def test_paths_to_smaller_faults_end() -> None:
+    """Each next cell of a plane is new, until the smallest hazardous cells on all paths have neighbours
+    without hazard.
+    """
+    plane = PlaneMap(Lattice(magnitudes=MAGNITUDES, durations_s=DURATIONS))
+    plane.add(plane.lattice.largest, CellResult(state=CellState.HAZARDOUS, experiment_id="", hazard="H1"))
+    count = 0
+    while cell := next(smaller_cells(plane), None):
+        assert cell not in plane.results
+        hazardous = is_hazardous(0, MAGNITUDES[cell[0]], DURATIONS[cell[1]])
+        state = CellState.HAZARDOUS if hazardous else CellState.WITHOUT_HAZARD
+        plane.add(cell, CellResult(state=state, experiment_id="", hazard="H1"))
+        count += 1
+    assert count <= 16
