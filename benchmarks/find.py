@@ -1,8 +1,8 @@
 """Compare the strategies of `mutator search` on the shipped target.
 
-`python benchmarks/find.py [--budgets 100 300] [--seeds 1 2 3]`. All faults that need no pictures, in S1 to S5, from
-two starts on. A finding is a hazard of a fault in a scenario from a start. The share of dominated cells, summed over
-planes, says how small and short the found faults are.
+`python benchmarks/find.py [--budgets 100 300] [--seeds 1 2 3]`. All faults that need no pictures, in S1 to
+S5, from two starts on. A finding is a hazard of a fault in a scenario from a start. The share of dominated
+cells, summed over planes, says how small and short the found faults are.
 """
 
 import argparse
