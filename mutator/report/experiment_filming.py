@@ -115,7 +115,7 @@ def _still_times(shots: Sequence[Shot], record: Record | None) -> Sequence[float
     crash before these times, whose last picture is then shown.
     """
     is_whole_run = record is not None and record.status is Status.OK
-    times = [shot.t for shot in shots if shot.t is not None]
+    times = [max(0.0, shot.t) for shot in shots if shot.t is not None]
     return times if is_whole_run and len(times) == len(shots) else ()
 
 

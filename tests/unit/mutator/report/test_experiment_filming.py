@@ -24,6 +24,7 @@ def test_a_film_is_whole_unless_it_is_for_stills_of_a_finished_run(
     still, video = Shot(path=Path("a.jpg"), t=2.0), Shot(path=Path("a.mp4"))
     finished, crashed = record(), record(status=Status.CRASHED)
     assert _still_times([still, still], finished) == [2.0, 2.0]
+    assert _still_times([Shot(path=Path("a.jpg"), t=-3.0)], finished) == [0.0]  # the first picture is shown
     assert _still_times([still, video], finished) == ()
     assert _still_times([still], crashed) == _still_times([still], None) == ()
 
