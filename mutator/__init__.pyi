@@ -36,6 +36,7 @@ from mutator.api.run_experiments import RunExperiment as RunExperiment
 from mutator.api.runs import Run as Run
 from mutator.api.runs import load_run as load_run
 from mutator.api.runs import merge_runs as merge_runs
+from mutator.api.smallest_form import SmallestForm as SmallestForm
 from mutator.api.target_places import find_place_notes as find_place_notes
 from mutator.api.target_places import find_places as find_places
 from mutator.api.trials import Trial as Trial
@@ -102,6 +103,7 @@ __all__ = [
     "RunExperiment",
     "Seals",
     "Shot",
+    "SmallestForm",
     "Status",
     "Summary",
     "TraceFrames",

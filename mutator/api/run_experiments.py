@@ -2,18 +2,24 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from mutator._common.argument_checks import check_whole_number
 from mutator._common.confined_files import path_below
 from mutator._common.files import ScratchFolder
 from mutator.api.experiment_results import TraceFrames, trace_frame
 from mutator.api.run_contents import RunContents
+from mutator.api.shrinks import Shrinker
+from mutator.api.smallest_form import SmallestForm
 from mutator.api.stored_experiments import StoredExperiment
 from mutator.api.trials import Trial, build_trial
+from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun_experiment
 from mutator.outcomes.series_sampling import write_sampled_series
 from mutator.outcomes.trace_and_record_loading import Trace, load_trace
 from mutator.report.experiment_filming import ExperimentFilmer, Shot
+from mutator.store.run_progress import ProgressCallback
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -73,6 +79,37 @@ class RunExperiment(StoredExperiment):
             )
             write_sampled_series(folder.path, manifest, golden, faulty, single.record)
         return trial
+
+    def shrink(
+        self,
+        out: str | Path | None = None,
+        *,
+        start: bool = False,
+        workers: int = 1,
+        engine: str | None = None,
+        progress: ProgressCallback | None = None,
+    ) -> SmallestForm:
+        """Find the smallest form of the fault that has the same hazard, the experiment's first.
+
+        Tried are a shorter fault, a simpler scenario (one that the campaign lists before), one injection
+        instead of several and a smaller value; with `start`, also a rounder start. The forms are driven on a
+        bench in the run folder `out`; default: in `shrunk/` beside this run. The same call goes on after an
+        interruption. `workers`: number of processes; `engine`, `progress`: as for `run`.
+
+        MutatorError for an experiment without a hazard, for an unfinished run, and if the target, templates,
+        scenario or spec have changed. CheckFailed if the smallest form differs on the reference engine.
+        """
+        check_whole_number("workers", workers, least=1)
+        check_engine_is_offered(engine)
+        if self.record is None:
+            raise self.not_run_error()
+        # two levels below runs/, so that the newest run there is still this one
+        run = self.run.path.resolve()
+        folder = run.parent / "shrunk" / f"{run.name}-{self.id}"
+        shrinker = Shrinker(self.run, self.experiment, self.record, start)
+        return shrinker.shrink(
+            Path(out) if out is not None else folder, workers=workers, engine=engine, notify=progress
+        )
 
     def film(self, shots: Sequence[Shot]) -> bool:
         """Rerun the golden and the faulty run, write videos or stills, and return whether the record equals

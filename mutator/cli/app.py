@@ -36,6 +36,7 @@ from mutator.cli import (
     review_command,
     serve_command,
     show_and_rerun_commands,
+    shrink_command,
     stpa_command,
     try_diff_generate_commands,
     verify_and_seal_commands,
@@ -71,7 +72,7 @@ SUBCOMMAND_GROUPS = (
     ("How much is survived", ("envelope", "search")),
     ("Campaigns", ("plan", "run", "watch", "merge", "report", "clean")),
     ("After a campaign", ("compare", "export", "verify", "seal")),
-    ("One experiment", ("show", "rerun")),
+    ("One experiment", ("show", "rerun", "shrink")),
     ("In a browser", ("serve",)),
 )
 EXAMPLES = f"""\b
@@ -150,6 +151,7 @@ for module in (
     envelope_and_search_commands,
     export_command,
     show_and_rerun_commands,
+    shrink_command,
     serve_command,
     cache_command,
 ):

@@ -73,7 +73,7 @@ class _BenchRun:
             self._records[record.experiment_id] = record
             missing.discard(record.experiment_id)
         for experiment_id in experiment_ids:
-            _check_harness(self._records[experiment_id])
+            check_harness(self._records[experiment_id])
         return [self._records[experiment_id] for experiment_id in experiment_ids]
 
     def _build_experiment(self, proposal: Proposal) -> Experiment:
@@ -84,7 +84,7 @@ class _BenchRun:
         return self._build(plane, magnitude, start_s, plane.durations_s[duration])
 
 
-def _check_harness(record: Record) -> None:
+def check_harness(record: Record) -> None:
     """Raise MutatorError for a harness error, from which nothing may be learned."""
     if record.status is Status.HARNESS_ERROR:
         raise MutatorError(
