@@ -31,7 +31,7 @@ from mutator.explore.envelope import Envelope
 from mutator.explore.exploration import Exploration
 from mutator.explore.exploration_run import BuildExperiment, find_drives, run_exploration
 from mutator.explore.finding_search import Finding, FindingSearch, dominated_share
-from mutator.model import Experiment
+from mutator.model import AfterHazard, Experiment
 from mutator.store.run_progress import ProgressCallback
 
 DEFAULT_POINTS, DEFAULT_LONGEST_S, DEFAULT_OBSERVE_S = 51, 15.0, 15.0
@@ -100,8 +100,8 @@ def envelope(
     * `seed`: of the runs, and of what validation and proof draw. `reading`, `workers`, `engine`, `reuse`,
       `cluster`, `insecure_network`: as for `open_bench`; `progress`: as for `run`.
 
-    The run folder `out` is that of a bench. MutatorError for invalid input, and if a golden run never reaches
-    a start; CheckFailed if a golden run fails its checks.
+    The run folder `out` is that of a bench, whose runs end at their first terminal hazard. MutatorError for
+    invalid input, and if a golden run never reaches a start; CheckFailed if a golden run fails its checks.
     """
     check_whole_number("search", search, least=1)
     check_whole_number("validation", validation)
@@ -255,7 +255,7 @@ def _opened_bench(
         opened_bench(
             selected_target.workspace,
             out,
-            {**values, "explore": asdict(section)},
+            {**values, "after_hazard": AfterHazard.STOP.value, "explore": asdict(section)},
             workers=workers,
             engine=engine,
             reuse=reuse,
@@ -279,6 +279,7 @@ def _builder(selected_target: SelectedTarget, reading: str) -> BuildExperiment:
             hold_s=duration_s,
             seed=plane.seed,
             reading=reading,
+            after_hazard=AfterHazard.STOP,  # later hazards decide nothing
             beyond=True,
         )
 
