@@ -33,6 +33,7 @@ from mutator.explore.exploration_run import BuildExperiment, find_drives, run_ex
 from mutator.explore.finding_search import Finding, FindingSearch, dominated_share
 from mutator.model import AfterHazard, Experiment
 from mutator.store.run_progress import ProgressCallback
+from mutator.targets.stop_at_hazard_code import can_stop_at_hazard
 
 DEFAULT_POINTS, DEFAULT_LONGEST_S, DEFAULT_OBSERVE_S = 51, 15.0, 15.0
 _ENVELOPE_PURPOSE = "How large and how long faults may be before a hazard follows."
@@ -100,8 +101,9 @@ def envelope(
     * `seed`: of the runs, and of what validation and proof draw. `reading`, `workers`, `engine`, `reuse`,
       `cluster`, `insecure_network`: as for `open_bench`; `progress`: as for `run`.
 
-    The run folder `out` is that of a bench, whose runs end at their first terminal hazard. MutatorError for
-    invalid input, and if a golden run never reaches a start; CheckFailed if a golden run fails its checks.
+    The run folder `out` is that of a bench, whose runs end at their first terminal hazard, if the target can
+    stop there. MutatorError for invalid input, and if a golden run never reaches a start; CheckFailed if a
+    golden run fails its checks.
     """
     check_whole_number("search", search, least=1)
     check_whole_number("validation", validation)
@@ -255,7 +257,7 @@ def _opened_bench(
         opened_bench(
             selected_target.workspace,
             out,
-            {**values, "after_hazard": AfterHazard.STOP.value, "explore": asdict(section)},
+            {**values, "after_hazard": _after_hazard(selected_target).value, "explore": asdict(section)},
             workers=workers,
             engine=engine,
             reuse=reuse,
@@ -268,7 +270,7 @@ def _opened_bench(
 
 
 def _builder(selected_target: SelectedTarget, reading: str) -> BuildExperiment:
-    builder = ExperimentBuilder(selected_target)
+    builder, after_hazard = ExperimentBuilder(selected_target), _after_hazard(selected_target)
 
     def build(plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float) -> Experiment:
         return builder.build(
@@ -279,11 +281,16 @@ def _builder(selected_target: SelectedTarget, reading: str) -> BuildExperiment:
             hold_s=duration_s,
             seed=plane.seed,
             reading=reading,
-            after_hazard=AfterHazard.STOP,  # later hazards decide nothing
+            after_hazard=after_hazard,
             beyond=True,
         )
 
     return build
+
+
+def _after_hazard(selected_target: SelectedTarget) -> AfterHazard:
+    """Return whether runs go on after a terminal hazard: what follows decides nothing, and costs time."""
+    return AfterHazard.STOP if can_stop_at_hazard(selected_target.manifest) else AfterHazard.GO_ON
 
 
 def _within(budget_s: float | None) -> Callable[[], bool]:

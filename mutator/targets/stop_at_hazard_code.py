@@ -52,6 +52,15 @@ def stop_function_source(manifest: TargetManifest) -> str:
     )
 
 
+def can_stop_at_hazard(manifest: TargetManifest) -> bool:
+    """Return whether runs of this target can end at their first terminal hazard."""
+    try:
+        stop_function_source(manifest)
+    except MutatorError:
+        return False
+    return True
+
+
 def _stop_condition(manifest: TargetManifest, hazard: Hazard) -> str:
     has_end_condition = hazard.terminal_condition != "True"
     text = hazard.terminal_condition if has_end_condition else hazard.when
