@@ -196,6 +196,7 @@ def write(size: int, out: Path) -> dict[str, float]:
         outcome_counts=count_by_outcome_or_status(run.results),
         plan_text="",
         glossary=glossary_of(run),
+        leading_panels=(),
         first_screen=build_first_screen_panel(run),
         answers=build_answers_panel(run),
         panels=[panel for panel in (build_fault_paths_panel(run),) if panel],

@@ -37,6 +37,7 @@ NAMES_BY_MODULE = {
     "mutator.api.reviews": ("ReviewedGroups", "load_review"),
     "mutator.api.run_experiments": ("RunExperiment",),
     "mutator.api.smallest_form": ("SmallestForm",),
+    "mutator.api.run_envelopes": ("RunEnvelope",),
     "mutator.api.runs": ("Run", "load_run", "merge_runs"),
     "mutator.api.target_places": ("find_place_notes", "find_places"),
     "mutator.api.trials": ("Trial", "try_fault"),

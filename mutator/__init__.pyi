@@ -32,6 +32,7 @@ from mutator.api.operator_mutants import OperatorChoice as OperatorChoice
 from mutator.api.plans import plan as plan
 from mutator.api.reviews import ReviewedGroups as ReviewedGroups
 from mutator.api.reviews import load_review as load_review
+from mutator.api.run_envelopes import RunEnvelope as RunEnvelope
 from mutator.api.run_experiments import RunExperiment as RunExperiment
 from mutator.api.runs import Run as Run
 from mutator.api.runs import load_run as load_run
@@ -100,6 +101,7 @@ __all__ = [
     "ReviewedGroups",
     "Run",
     "RunComparison",
+    "RunEnvelope",
     "RunExperiment",
     "Seals",
     "Shot",

@@ -1,7 +1,7 @@
 """Audits: check that a run folder is unchanged, and that its content follows from its plan and sources."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,8 @@ from mutator.audit.seal_signatures import sign_seal as write_signature
 from mutator.audit.seal_signatures import verified_signer
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import draw_experiment_ids, rerun_and_compare
+from mutator.explore.envelope_files import envelope_file_problems
+from mutator.explore.exploration_replay import is_exploration, replay_exploration
 from mutator.report.report_audit import audit_report
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_environments import describe_environments, version_texts_by_package
@@ -123,6 +125,7 @@ def verify(
     opened_workspace = _open_workspace_if_any(workspace)
     checks = run_audit_checks(folder, opened_workspace)
     facts = _run_facts(folder)
+    checks += _exploration_checks(folder, opened_workspace, facts)
     if rerun:
         checks.append(_rerun_check(folder, opened_workspace, rerun, facts))
     seals = _seals_if_undamaged(folder, checks)
@@ -207,6 +210,28 @@ def _open_workspace_if_any(workspace: WorkspaceLike) -> Workspace | None:
         if workspace is not None:  # a library that was named must exist; one that was only sought need not
             raise
         return None
+
+
+def _exploration_checks(
+    folder: RunFolder, workspace: Workspace | None, facts: dict[str, str]
+) -> list[AuditCheck]:
+    """Replay an exploration; nothing for other runs, and without the library, which reads golden runs."""
+    try:
+        if workspace is None or not is_exploration(folder):
+            return []
+        manifest = workspace.manifest(folder.head.target)
+    except MutatorError:  # other checks report a damaged file and a missing target
+        return []
+
+    def problems() -> Iterator[MutatorError]:
+        replay = replay_exploration(folder, manifest)
+        facts["exploration"] = replay.note or "complete"
+        yield from replay.differences
+        if folder.is_finished:
+            yield from envelope_file_problems(folder.path, replay)
+
+    count = folder.head.experiments
+    return [AuditCheck.from_problems("proposals that follow from the records", count, problems())]
 
 
 def _rerun_check(

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 from mutator._common.confined_files import path_below
 from mutator._common.table_rendering import TextTable
 from mutator.api.notebook_html import text_html
+from mutator.api.run_envelopes import RunEnvelope
 from mutator.api.runs import Run, alerts_note_if_any, load_run, scene_if_any
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison_and_gates as comparing
 from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeKind
 from mutator.comparison.run_comparison_and_gates import Comparison, Gate, GateFinding
-from mutator.errors import MutatorError
+from mutator.errors import CheckFailed, MutatorError
 from mutator.report import run_history
 from mutator.report.run_history import History
 
@@ -115,7 +116,20 @@ def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None
     runs = [run if isinstance(run, Run) else load_run(run) for run in (a, b)]
     first, second = map(alerts_note_if_any, runs)
     scenes = (scene_if_any(runs[0]), scene_if_any(runs[1]))
-    return RunComparison(comparing.compare_runs(runs[0].path, runs[1].path, only, (first, second), scenes))
+    envelopes = (_envelopes_if_any(runs[0]), _envelopes_if_any(runs[1]))
+    return RunComparison(
+        comparing.compare_runs(runs[0].path, runs[1].path, only, (first, second), scenes, envelopes)
+    )
+
+
+def _envelopes_if_any(run: Run) -> tuple[RunEnvelope, ...]:
+    """Return the envelopes of an exploration; empty without a library that has its target."""
+    try:
+        return run.envelopes
+    except CheckFailed:
+        raise
+    except (MutatorError, KeyError):
+        return ()
 
 
 def _pair_cells_frame(pairs: Sequence[ExperimentPair]) -> "pd.DataFrame":

@@ -13,6 +13,7 @@ from mutator._common.message_text import describe_choices
 from mutator.api.benches import bench_values, distributor_of_cluster, warn_of_end
 from mutator.api.experiments import ExperimentBuilder
 from mutator.api.exploration_planes import chosen_planes
+from mutator.api.run_envelopes import RunEnvelope, envelopes_of_replay
 from mutator.api.scenario_choice import ScenarioLike
 from mutator.api.target_and_fault_selection import (
     SelectedTarget,
@@ -27,8 +28,9 @@ from mutator.execution.bench import Bench
 from mutator.execution.bench_opening import finishing, opened_bench
 from mutator.execution.distributor_choice import Distributor
 from mutator.execution.session_summary import Summary
-from mutator.explore.envelope import Envelope
+from mutator.explore.envelope_files import delete_envelopes, write_envelopes
 from mutator.explore.exploration import Exploration
+from mutator.explore.exploration_replay import ExplorationReplay
 from mutator.explore.exploration_run import BuildExperiment, find_drives, run_exploration
 from mutator.explore.finding_search import Finding, FindingSearch, dominated_share
 from mutator.model import AfterHazard, Experiment
@@ -43,21 +45,21 @@ _T = TypeVar("_T")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Envelopes(Sequence[Envelope]):
+class Envelopes(Sequence[RunEnvelope]):
     """The envelopes of an exploration, in the order in which its planes were asked for."""
 
     run: Path  #: the run folder
-    envelopes: tuple[Envelope, ...]  #: an envelope for each fault, scenario and start
+    envelopes: tuple[RunEnvelope, ...]  #: an envelope for each fault, scenario and start that was begun
     summary: Summary | None  #: the summary of the bench; None if nothing was planned
 
     def __len__(self) -> int:
         return len(self.envelopes)
 
     @overload
-    def __getitem__(self, index: int) -> Envelope: ...
+    def __getitem__(self, index: int) -> RunEnvelope: ...
     @overload
-    def __getitem__(self, index: slice) -> tuple[Envelope, ...]: ...
-    def __getitem__(self, index: int | slice) -> Envelope | tuple[Envelope, ...]:
+    def __getitem__(self, index: slice) -> tuple[RunEnvelope, ...]: ...
+    def __getitem__(self, index: int | slice) -> RunEnvelope | tuple[RunEnvelope, ...]:
         return self.envelopes[index]
 
 
@@ -138,10 +140,13 @@ def envelope(
         build = _builder(selected_target, values["reading"])
         drives = find_drives(bench, selected_target.manifest, section, build)
         exploration = Exploration(section=section, drives=drives, seed=seed)
+        delete_envelopes(bench.path)  # a kill must not leave those of fewer runs
         run_exploration(bench, exploration, build, _within(budget_s))
+        explored = ExplorationReplay(exploration)
+        if explored.envelopes:
+            write_envelopes(bench.path, explored)
     warn_of_end(bench.summary)
-    envelopes = tuple(Envelope(plane) for plane in exploration.planes)
-    return Envelopes(run=Path(out), envelopes=envelopes, summary=bench.summary)
+    return Envelopes(run=Path(out), envelopes=envelopes_of_replay(explored), summary=bench.summary)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,10 +5,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.hashing import as_json_types
+from mutator.api.run_envelopes import RunEnvelope, envelopes_of_replay
 from mutator.api.stored_experiments import StoredRun
 from mutator.campaigns.plan import Plan, load_plan
-from mutator.errors import MutatorError
+from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.run_traces import RunTraces
+from mutator.explore.exploration_replay import is_exploration, replay_exploration
 from mutator.model import Status
 from mutator.results import outcome_counting
 from mutator.results.table_reader import Results
@@ -64,6 +66,18 @@ class RunContents(StoredRun):
         frame = self._results_frame
         failed = frame[frame["status"] == Status.HARNESS_ERROR.value]
         return dict(zip(failed["experiment_id"], failed["detail"], strict=True))
+
+    @cached_property
+    def envelopes(self) -> tuple[RunEnvelope, ...]:
+        """What an exploration says of each fault, scenario and start that it has begun, from its plan and
+        records; empty for other runs. CheckFailed if the plan does not follow from the records.
+        """
+        if not is_exploration(self.folder):
+            return ()
+        replay = replay_exploration(self.folder, self.manifest)
+        for difference in replay.differences:
+            raise CheckFailed(difference.got, where=difference.where, expected=difference.expected)
+        return envelopes_of_replay(replay)
 
     @cached_property
     def _results_frame(self) -> "pd.DataFrame":

@@ -22,8 +22,8 @@ MOST_LISTED_FINDINGS = 20  # experiments listed in the terminal; the written com
 GATES_HELP = (
     "new-hazard, new-silent-hazard (no alert comes before it; new, or its alert is lost), other-hazard, "
     "golden-hazard (without any fault), higher-severity, earlier-hazard, lost-alert, worse, new-crash, "
-    "harness-error, unmatched, severity:CLASS (S0 to S3: RUN_B has a hazard of that class or worse, RUN_A a "
-    "milder one or none)"
+    "harness-error, smaller-envelope (of an exploration), unmatched, severity:CLASS (S0 to S3: RUN_B has a "
+    "hazard of that class or worse, RUN_A a milder one or none)"
 )
 
 
@@ -38,6 +38,7 @@ Examples:
   mutator compare runs/main runs/change \\
     --fail-on new-hazard,new-silent-hazard,other-hazard,golden-hazard,new-crash,harness-error,unmatched
   mutator compare runs/main runs/change --fail-on severity:S2
+  mutator compare runs/speed_before runs/speed_after --fail-on smaller-envelope
   mutator compare runs/main runs/change --fail-on new-hazard --github
 
 With --fail-on, the exit code is 1 if such a change is found; each is printed. Otherwise it is 3 if

@@ -12,6 +12,7 @@ from mutator._common.files import make_folder, write_atomic
 from mutator._common.message_text import counted, with_unbreakable_numbers
 from mutator._common.table_rendering import TextTable, escaped_markdown_line
 from mutator.comparison.comparison_replays import ReportAddresses, addresses_from, replay_elements
+from mutator.comparison.envelope_changes import describe_envelope_changes
 from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeKind, time_to_hazard
 from mutator.comparison.input_differences_and_remarks import InputFact
 from mutator.comparison.run_comparison_and_gates import Comparison, Gate, describe_ending_change
@@ -77,7 +78,8 @@ def unmatched_csv(comparison: Comparison) -> bytes:
 def summary_text(comparison: Comparison) -> str:
     c = comparison
     counts = Counter(change for pair in c.pairs for change in pair.change_kinds)
-    text = f"In both runs: {counted(len(c.pairs), 'experiment')}. "
+    envelopes = describe_envelope_changes(c.envelope_changes)
+    text = f"{envelopes} In both runs: {counted(len(c.pairs), 'experiment')}. ".lstrip()
     if counts:
         listed = ", ".join(
             f"{change.value} {counts[change]}" for change in ResultChangeKind if counts[change]

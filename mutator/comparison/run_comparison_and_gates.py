@@ -1,6 +1,6 @@
 """A comparison of two runs: tables, remarks and gate findings."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -9,6 +9,14 @@ from typing import Any
 
 from mutator._common.phrase_texts import measured_number_text
 from mutator.comparison.compared_runs import ComparedRun, load_compared_run
+from mutator.comparison.envelope_changes import (
+    EnvelopeChange,
+    EnvelopesOfEachRun,
+    compare_envelopes,
+    envelopes_sheet,
+    planes_only_in,
+    remarks_on_planes,
+)
 from mutator.comparison.experiment_matching import (
     ExperimentMatching,
     ExperimentPair,
@@ -36,6 +44,7 @@ from mutator.comparison.paired_rate_and_time_sheets import (
     usable_pair_events,
 )
 from mutator.errors import MutatorError
+from mutator.explore.envelope_texts import name_of_plane
 from mutator.model import Experiment
 from mutator.results.result_rows import ResultRow
 from mutator.statistics.statistics_sheet import Sheet
@@ -66,6 +75,8 @@ class Gate(StrEnum):
     HARNESS_ERROR = (
         ResultChangeKind.HARNESS_ERROR.value
     )  #: the second run has no result, although the first has one
+    #: an exploration's fault leads to a hazard that the first run calls survived
+    SMALLER_ENVELOPE = "smaller-envelope"
     UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
     SEVERITY_S0 = "severity:S0"  #: a hazard of class S0 or worse; in the first run a milder one or none
     SEVERITY_S1 = "severity:S1"  #: a hazard of class S1 or worse; in the first run a milder one or none
@@ -86,7 +97,8 @@ class GateFinding:
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
     """Two matched runs. `golden_alerts_notes` has a note on the alerts of each run's golden runs, or '';
-    `scenes` has what the page's replays of each run draw, as JSON, or None.
+    `scenes` has what the page's replays of each run draw, as JSON, or None; `envelopes` those of each run
+    that is an exploration.
     """
 
     a: ComparedRun
@@ -94,6 +106,12 @@ class Comparison:
     matching: ExperimentMatching
     golden_alerts_notes: tuple[str, str] = ("", "")
     scenes: SceneOfEachRun = (None, None)
+    envelopes: EnvelopesOfEachRun = ((), ())
+
+    @cached_property
+    def envelope_changes(self) -> tuple[EnvelopeChange, ...]:
+        """The planes that both runs have explored."""
+        return compare_envelopes(self.envelopes)
 
     @cached_property
     def names(self) -> RunDisplayNames:
@@ -133,6 +151,7 @@ class Comparison:
             + differing_pairs_remarks(self.a, self.b, self.matching)
             + severity_remarks(self.a, self.b)
             + alert_remarks
+            + tuple(remarks_on_planes(self.envelopes, self.names))
         )
 
     @cached_property
@@ -150,7 +169,9 @@ class Comparison:
         counts = (endings_cross_table(self.pairs, self.names), change_counts_sheet(self.pairs))
         metrics, metrics_by_type = metrics_sheets(self.pairs, self.a, self.b, self.names)
         severity = severity_cross_table(self.pairs, self.names, self.b.folder.severity_scale)
+        explored = self.envelope_changes
         return (
+            *([envelopes_sheet(explored, self.names)] if explored else []),
             *(*counts, rates, spans),
             *(sheet for sheet in (severity, metrics) if sheet.lines),
             *(rates_by_type, spans_by_type, *([metrics_by_type] if metrics.lines else [])),
@@ -186,6 +207,7 @@ def compare_runs(
     only: str | None = None,
     golden_alerts_notes: tuple[str, str] = ("", ""),
     scenes: SceneOfEachRun = (None, None),
+    envelopes: EnvelopesOfEachRun = ((), ()),
 ) -> Comparison:
     """Compare two run folders; `only` filters experiments by plan columns.
 
@@ -208,7 +230,14 @@ def compare_runs(
             expected="runs of the same faults, scenarios and triggers",
             remedy="compare runs of one campaign, or widen `only`",
         )
-    return Comparison(a=a, b=b, matching=matching, golden_alerts_notes=golden_alerts_notes, scenes=scenes)
+    return Comparison(
+        a=a,
+        b=b,
+        matching=matching,
+        golden_alerts_notes=golden_alerts_notes,
+        scenes=scenes,
+        envelopes=envelopes,
+    )
 
 
 def findings_of_gates(comparison: Comparison, gates: Sequence[Gate]) -> tuple[GateFinding, ...]:
@@ -220,6 +249,9 @@ def findings_of_gates(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Ga
             gate_findings += [
                 GateFinding(gate=gate, experiment_id=e.id, description=e.label) for e in unmatched
             ]
+            continue
+        if gate is Gate.SMALLER_ENVELOPE:
+            gate_findings += _smaller_envelopes(comparison)
             continue
         _, is_severity, least = gate.value.partition(":")
         pairs = (
@@ -237,6 +269,26 @@ def findings_of_gates(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Ga
             for p in pairs
         ]
     return tuple(gate_findings)
+
+
+def _smaller_envelopes(comparison: Comparison) -> Iterator[GateFinding]:
+    changes = comparison.envelope_changes
+    undecided = [change.b for change in changes if not change.decided]
+    missing = [*planes_only_in(*comparison.envelopes), *undecided]
+    if missing or not changes:
+        raise MutatorError(
+            f"{name_of_plane(missing[0])} is not decided" if missing else "no exploration",
+            where=comparison.b.folder.path,
+            argument="fail_on",
+            expected=f"what {comparison.a.name} has explored, and the library of both runs",
+            remedy="finish it with the same `mutator envelope`, or omit the gate",
+        )
+    compared = {experiment.id for experiment in comparison.b.experiments}  # `only` leaves some out
+    for change in changes:
+        if change.proof and change.proof.experiment_id in compared:
+            yield GateFinding(
+                gate=Gate.SMALLER_ENVELOPE, experiment_id=change.proof.experiment_id, description=change.text
+            )
 
 
 def _pairs_reaching_class(comparison: Comparison, least: str) -> tuple[ExperimentPair, ...]:

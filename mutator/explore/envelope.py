@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import copysign
 from typing import Any
 
 from mutator.campaigns.exploration_section import ExploredPlane
@@ -77,7 +78,7 @@ class Envelope:
     @property
     def longest_tried_s(self) -> float:
         """The longest duration that leaves time to observe what follows, in s."""
-        return self.durations_s[min(self.exploration.decidable, len(self.durations_s)) - 1]
+        return self.durations_s[self.columns_up_to() - 1]
 
     def survives(self, magnitude: float | None, duration_s: float) -> bool:
         """Return whether the cell that is at least as large and long as this fault is called without hazard.
@@ -90,9 +91,16 @@ class Envelope:
         """Return the state of the cell that is at least as large and long as this fault; unknown if it is
         larger or longer than any.
         """
-        line = _first_at_least(self.magnitudes, magnitude)
+        line = self._first_line_at_least(magnitude)
         duration = _first_at_least(self.durations_s, duration_s)
         return CellState.UNKNOWN if line is None or duration is None else self.cells[line][duration]
+
+    def _first_line_at_least(self, magnitude: float | None) -> int | None:
+        """None for another sign, too, and for a magnitude where the fault has no value, or the reverse."""
+        if magnitude is None or self.magnitudes[0] is None:
+            return 0 if magnitude is self.magnitudes[0] else None
+        sizes = [value / copysign(1.0, magnitude) for value in self.magnitudes if value is not None]
+        return _first_at_least(sizes, abs(magnitude))
 
     def longest_survived_s(self, line: int) -> float | None:
         """Return the longest duration up to which all of a line are without hazard; None if the shortest is
@@ -111,21 +119,26 @@ class Envelope:
             None,
         )
 
-    def largest_survived(self, duration_s: float | None = None) -> float | None:
-        """Return the magnitude up to which all are survived for this duration, by default for every duration
-        that leaves time to observe what follows; None if the smallest is not.
+    def columns_up_to(self, duration_s: float | None = None) -> int:
+        """Return the number of durations up to the first one that is at least as long, by default of those
+        that leave time to observe what follows.
         """
-        last = (
-            self.exploration.decidable - 1
-            if duration_s is None
-            else _last_at_most(self.durations_s, duration_s)
-        )
-        if last is None:
+        if duration_s is None:
+            return min(self.exploration.decidable, len(self.durations_s))
+        first = _first_at_least(self.durations_s, duration_s)
+        return len(self.durations_s) if first is None else first + 1
+
+    def largest_survived(self, duration_s: float | None = None) -> float | None:
+        """Return the magnitude up to which all are survived for every duration up to this one (that of the
+        first cell that is at least as long), by default for every duration that leaves time to observe what
+        follows; None if the smallest is not, or if no cell is as long.
+        """
+        if duration_s is not None and duration_s > self.durations_s[-1]:
             return None
-        columns = range(last + 1) if duration_s is None else (last,)
+        count = self.columns_up_to(duration_s)
         survived = None
         for magnitude, line in zip(self.magnitudes, self.cells, strict=True):
-            if not all(line[j].is_without_hazard for j in columns):
+            if not all(state.is_without_hazard for state in line[:count]):
                 break
             survived = magnitude
         return survived
@@ -164,6 +177,7 @@ class Envelope:
             "start_s": self.drive.start_s,
             "end_s": self.drive.end_s,
             "seed": self.plane.seed,
+            "unit": self.plane.unit,
             "magnitudes": list(self.plane.magnitudes),
             "durations_s": list(self.durations_s),
             "cells": ["".join(CODE_BY_STATE[state] for state in line) for line in self.cells],
@@ -188,14 +202,8 @@ def _pair_as_json(pair: BoundaryPair | None) -> Mapping[str, Any] | None:
     return {"without_hazard": pair.without_hazard.experiment_id, "hazardous": pair.hazardous.experiment_id}
 
 
-def _first_at_least(values: Sequence[float | None], value: float | None) -> int | None:
-    if value is None:
-        return 0
-    return next((i for i, other in enumerate(values) if other is None or abs(other) >= abs(value)), None)
-
-
-def _last_at_most(values: Sequence[float], value: float) -> int | None:
-    return next((i for i in reversed(range(len(values))) if values[i] <= value), None)
+def _first_at_least(values: Sequence[float], value: float) -> int | None:
+    return next((i for i, other in enumerate(values) if other >= value), None)
 
 
 def _connected_groups(cells: set[Cell]) -> Iterator[list[Cell]]:

@@ -16,7 +16,7 @@ _HEADS = ("fault", "scenario", "from")
 def describe_envelope(envelope: Envelope) -> str:
     """Return what is survived and what is not, in one sentence."""
     plane = envelope.plane
-    where = f"{plane.spec} in {plane.scenario} from {_start_text(envelope)}"
+    where = f"{plane.spec} in {plane.scenario} from {start_text(envelope)}"
     failing = first_failing_line(envelope)
     longest = f"{envelope.longest_tried_s:g} s"
     if failing is None:
@@ -52,7 +52,7 @@ def _table_row(envelope: Envelope) -> list[str]:
     return [
         plane.spec,
         plane.scenario,
-        _start_text(envelope),
+        start_text(envelope),
         *(_survived_text(envelope, duration) for duration in durations),
         _magnitude_text(envelope, last),
         "-" if longest is None else f"{longest:g} s",
@@ -115,6 +115,17 @@ def _survived_text(envelope: Envelope, duration_s: float | None) -> str:
     return "-" if survived is None else magnitude_text(envelope, survived)
 
 
-def _start_text(envelope: Envelope) -> str:
+def fault_text(envelope: Envelope) -> str:
+    """Return the name of the fault, with its sign if that is negative."""
+    is_negative = (envelope.magnitudes[0] or 0.0) < 0
+    return f"{envelope.plane.spec} (negative)" if is_negative else envelope.plane.spec
+
+
+def name_of_plane(envelope: Envelope) -> str:
+    """Return the fault, scenario and start: `sensor/bias/distance (negative) in S1 from 5 s`."""
+    return f"{fault_text(envelope)} in {envelope.plane.scenario} from {start_text(envelope)}"
+
+
+def start_text(envelope: Envelope) -> str:
     start = envelope.plane.start
     return f"{start} s" if start.replace(".", "", 1).isdigit() else f"{start} ({envelope.drive.start_s:g} s)"

@@ -16,6 +16,11 @@ BATCHES_IN_FLIGHT = (
 )
 
 
+def reason_of_batch(number: int) -> str:
+    """Return the reason that the plan keeps with a batch."""
+    return f"exploration, batch {number}"
+
+
 class Proposal(NamedTuple):
     """A cell to drive. `plane` is the number of its plane."""
 
@@ -78,21 +83,24 @@ class BatchProposer(Protocol):
 class BatchLoop:
     """Keeps batches of an exploration in flight.
 
-    `begin` is called with the number and the proposals of a batch; `finish` returns its records, in order.
+    `begin` is called with the number and the proposals of a batch, if `may_begin` accepts these; `finish`
+    returns its records, in order.
     """
 
     exploration: BatchProposer
     begin: Callable[[int, Sequence[Proposal]], None]
     finish: Callable[[Sequence[Proposal]], Iterable[Record]]
-    may_begin: Callable[[], bool] = lambda: True
+    may_begin: Callable[[Sequence[Proposal]], bool] = lambda batch: True
 
     def run(self) -> None:
         """Run until nothing is proposed, or until `may_begin` says no."""
         in_flight: deque[list[Proposal]] = deque()
-        number = 0
+        number, is_ending = 0, False
         while True:
-            while len(in_flight) < BATCHES_IN_FLIGHT and self.may_begin():
+            while len(in_flight) < BATCHES_IN_FLIGHT and not is_ending:
                 if not (batch := self.exploration.propose()):
+                    break
+                if is_ending := not self.may_begin(batch):  # what was proposed is not proposed again
                     break
                 number += 1
                 self.begin(number, batch)

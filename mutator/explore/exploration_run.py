@@ -7,7 +7,7 @@ from mutator.campaigns.exploration_section import ExplorationSection, ExploredPl
 from mutator.errors import MutatorError
 from mutator.execution.bench import Bench
 from mutator.explore.cell_results import Drive
-from mutator.explore.exploration import BatchLoop, BatchProposer, Proposal
+from mutator.explore.exploration import BatchLoop, BatchProposer, Proposal, reason_of_batch
 from mutator.explore.golden_drives import drive_of, load_observed_values
 from mutator.model import Experiment, Record, Status
 from mutator.store.golden_runs import GoldenRun
@@ -30,7 +30,9 @@ def run_exploration(
     MutatorError if the harness failed in an experiment.
     """
     run = _BenchRun(bench, proposer, build)
-    BatchLoop(exploration=proposer, begin=run.begin, finish=run.finish, may_begin=may_begin).run()
+    BatchLoop(
+        exploration=proposer, begin=run.begin, finish=run.finish, may_begin=lambda batch: may_begin()
+    ).run()
 
 
 def find_drives(
@@ -62,7 +64,7 @@ class _BenchRun:
     def begin(self, number: int, batch: Sequence[Proposal]) -> None:
         experiments = [self._build_experiment(proposal) for proposal in batch]
         self._experiment_ids |= {p: e.id for p, e in zip(batch, experiments, strict=True)}
-        self._bench.submit(experiments, f"exploration, batch {number}")
+        self._bench.submit(experiments, reason_of_batch(number))
 
     def finish(self, batch: Sequence[Proposal]) -> Iterable[Record]:
         experiment_ids = [self._experiment_ids[proposal] for proposal in batch]

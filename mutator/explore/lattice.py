@@ -1,7 +1,9 @@
 """The lattice of an exploration: magnitudes and durations at equal distances of their logarithm."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TypeAlias
 
 _SIGNIFICANT_DIGITS = 3  # of a magnitude: enough to tell neighbours apart, and numbers that people read
@@ -51,3 +53,12 @@ def _logarithmic_steps(first: float, last: float, points: int) -> list[float]:
 
 def _rounded(value: float) -> float:
     return round(value, _SIGNIFICANT_DIGITS - 1 - math.floor(math.log10(value)))
+
+
+def cell_edges(values: Sequence[float]) -> list[float]:
+    """Return the edges of cells on a logarithmic axis: between neighbours, and as far beyond the ends."""
+    sizes = [abs(value) for value in values]
+    inner = [math.sqrt(a * b) for a, b in pairwise(sizes)]
+    if not inner:
+        return [sizes[0] / 2, sizes[0] * 2]
+    return [sizes[0] ** 2 / inner[0], *inner, sizes[-1] ** 2 / inner[-1]]

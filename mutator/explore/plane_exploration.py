@@ -53,6 +53,17 @@ class PlaneExploration:
         last_s = self.drive.end_s - self.drive.start_s - self.section.observe_s + self.drive.step_s / 2
         return max(1, sum(duration <= last_s for duration in self.map.lattice.durations_s))
 
+    @property
+    def is_complete(self) -> bool:
+        """Whether nothing is left to drive."""
+        if self._awaited or (self._is_searching and self.section.validation):
+            return False
+        if self._is_searching:
+            return not self._next_in_search()
+        validation = self.validations[-1]
+        is_last = len(self.validations) == MOST_VALIDATIONS or not self.failures(validation)
+        return is_last and not self._not_proposed(validation.drawn)
+
     def cells(self) -> list[Line]:
         """Return the state of every cell, by magnitude and duration."""
         return self.map.cells(self._search().closed_lines())

@@ -60,9 +60,8 @@ _ALERT_COLUMNS = ("alerts", "t_alert", "reaction_time")  # columns that need a t
 MOST_EMBEDDED_STILL_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
 _TRACE_DIGEST_DIGITS = 16  # enough to notice another trace; whole digests would be four times as long
 _MOST_BYTES_OF_FIRST_REPLAY = 500_000  # about 7 kB are usual; a larger series is read from its file
-MOST_LISTED_EXPERIMENTS = (
-    50_000  # maximum number of experiments that the page lists, so that it opens quickly
-)
+MOST_LISTED_EXPERIMENTS = 50_000  # that the page lists, so that it opens quickly
+_MOST_LISTED_OF_EXPLORATION = 12_000  # these are less alike, and pictures need room, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,12 +119,20 @@ def first_replay_data(run: ReportedRun) -> tuple[dict[str, Any], dict[str, Marku
     return facts, {EMBEDDED_SERIES_ELEMENT: Markup(element)} if embedded else {}
 
 
-def _describe_truncation(run: ReportedRun) -> str:
-    count, path = len(run.results), run.folder.path.name
-    if count <= MOST_LISTED_EXPERIMENTS:
-        return ""
+def most_listed_experiments(run: ReportedRun) -> int:
+    """Return how many of the worst experiments of a run the page lists. It also lists those that it links."""
     return (
-        f"The list has the {MOST_LISTED_EXPERIMENTS:,} worst of {count:,} experiments (by rank). All other "
+        min(MOST_LISTED_EXPERIMENTS, _MOST_LISTED_OF_EXPLORATION) if run.explored else MOST_LISTED_EXPERIMENTS
+    )
+
+
+def _describe_truncation(run: ReportedRun) -> str:
+    count, path, most = len(run.results), run.folder.path.name, most_listed_experiments(run)
+    if count <= most:
+        return ""
+    linked = ", and those with links above," if run.explored else ""
+    return (
+        f"The list has the {most:,} worst{linked} of {count:,} experiments (by rank). All other "
         "parts of this page cover all experiments. To see another experiment: "
         f"`mutator show ID --run {path}`. To list the worst that match a filter: "
         f"`mutator show --run {path} --only 'FILTER'`. All experiments are in results.parquet."
@@ -144,7 +151,9 @@ def _film_and_scene_facts(folder: RunFolder, workspace: "Workspace | None") -> d
 
 def _listed_results(run: ReportedRun) -> "DataFrame":
     """Return the results that the page lists, in reading order, with rank and path."""
-    is_listed = run.experiment_facts.worst_first_ranks < MOST_LISTED_EXPERIMENTS
+    is_listed = run.experiment_facts.worst_first_ranks < most_listed_experiments(run)
+    if run.explored:
+        is_listed |= run.results["experiment_id"].isin(run.explored.linked_ids).to_numpy()
     extra_columns = {
         RANK_COLUMN: run.experiment_facts.worst_first_ranks[is_listed],
         UNTIMED_PATH_COLUMN: run.experiment_facts.untimed_path_indices[is_listed],

@@ -15,7 +15,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.report.change_since_run_before import RUN_BEFORE_FILE, ChangeSinceRunBefore, find_change
 from mutator.report.experiment_list_data import ExperimentListData, build_list_data
 from mutator.report.panel import REPORT_FOLDER, ReportPage
-from mutator.report.panels import build_pages, build_panels, build_study_page
+from mutator.report.panels import LEADING_PANELS, build_pages, build_panels, build_study_page
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.panels.first_screen_panel import build_first_screen_panel
 from mutator.report.report_digests import inputs_digest, is_report_current, write_report_files
@@ -140,6 +140,7 @@ def _build_content(
         outcome_counts=count_by_outcome_or_status(run.results),
         plan_text=_describe_plan(run.folder),
         glossary=glossary_of(run),
+        leading_panels=build_panels(run, LEADING_PANELS),
         first_screen=build_first_screen_panel(run),
         answers=build_answers_panel(run),
         panels=build_panels(run),

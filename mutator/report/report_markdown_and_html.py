@@ -14,9 +14,10 @@ from mutator.web import asset_text, csp_hash, json_script_element, load_order
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportContent:
-    """The content of both forms of a report. `alarm` is shown first, then `first_screen` and `answers`.
-    `panels` come after the list of experiments. `pages` lie beside the report, as does `study`, the
-    comparison with the campaign's study. `replays_note` says which replays a page contains that lies alone.
+    """The content of both forms of a report. `alarm` is shown first, then `leading_panels`, `first_screen`
+    and `answers`. `panels` come after the list of experiments. `pages` lie beside the report, as does
+    `study`, the comparison with the campaign's study. `replays_note` says which replays a page contains that
+    lies alone.
     """
 
     title: str
@@ -24,6 +25,7 @@ class ReportContent:
     outcome_counts: Mapping[str, int]
     plan_text: str
     glossary: Glossary
+    leading_panels: Sequence[Panel]
     first_screen: Panel
     answers: Panel
     panels: Sequence[Panel]
@@ -50,6 +52,7 @@ def report_markdown(content: ReportContent) -> str:
         f"# {content.title}",
         f"**{content.alarm}**" if content.alarm else "",
         f"{counted(total, 'experiment')}: {endings}. {content.plan_text}",
+        *(panel.markdown for panel in content.leading_panels),
         content.first_screen.markdown,
         content.answers.markdown,
         *(panel.markdown for panel in content.on_one_page().panels),
@@ -77,7 +80,7 @@ def report_html(content: ReportContent, *, is_alone: bool = False) -> str:
             Markup(asset_text(name))
             for name in (
                 *load_order("report", ".css"),
-                *dict.fromkeys(p.style for p in content.panels if p.style),
+                *dict.fromkeys(p.style for p in (*content.leading_panels, *content.panels) if p.style),
             )
         ],
         scripts=list(map(Markup, scripts)),

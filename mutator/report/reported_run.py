@@ -14,6 +14,7 @@ from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.report.change_since_run_before import ChangeSinceRunBefore
 from mutator.report.engine_summary import EngineSummary, summarize_engines
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN, ExperimentFacts
+from mutator.report.explored_planes import ExploredPlanes
 from mutator.report.fault_path_page_data import RunFaultPaths
 from mutator.report.panel import Panel
 from mutator.report.source_lines_with_outcomes import SourceLines
@@ -35,7 +36,7 @@ class ReportedRun:
     """The data that a report is made from. `results` are all experiments with a record, `frame` the usable
     ones. `faults` are those of the plan; `experiments` (the plan) and `records` are read on access. Without a
     workspace, no experiment can be rerun, and there is no study. `has_study_page`: the study has its own
-    page on these results. `change` is that against the run before.
+    page on these results. `change` is that against the run before. `explored` is what an exploration found.
     """
 
     folder: RunFolder
@@ -47,6 +48,7 @@ class ReportedRun:
     engine_summary: EngineSummary | None = None
     has_study_page: bool = False
     change: ChangeSinceRunBefore | None = None
+    explored: ExploredPlanes | None = None
     run_fault_paths: RunFaultPaths | None = None
     source_lines: SourceLines | None = None
     faults: Mapping[str, Fault] = field(default_factory=dict)
@@ -74,6 +76,7 @@ class ReportedRun:
             engine_summary=summarize_engines(folder, records, facts.timings),
             published_work=_find_published_work(folder) if workspace else None,
             experiment_facts=facts,
+            explored=ExploredPlanes.of_run(folder, workspace),
             faults=faults,
             run_fault_paths=RunFaultPaths.of(
                 folder, fault_paths, experiments, records, facts.distinct_untimed_paths

@@ -13,9 +13,9 @@ from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.report.experiment_list_data import (
     MOST_EMBEDDED_STILL_BYTES,
-    MOST_LISTED_EXPERIMENTS,
     ExperimentListData,
     media_by_experiment,
+    most_listed_experiments,
 )
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.report_markdown_and_html import ReportContent, report_html
@@ -41,7 +41,7 @@ def single_file_html(content: ReportContent, run: ReportedRun) -> str:
     """Return the page of a report that works without any other file."""
     ids, series = _ids_worst_first(run), TimeSeriesFolder(run.folder.path)
     embedded, last_rank = embed_worst(series, map(run.records.get, ids), MOST_EMBEDDED_SERIES_BYTES)
-    is_cut = last_rank < min(len(run.results), MOST_LISTED_EXPERIMENTS)
+    is_cut = last_rank < min(len(run.results), most_listed_experiments(run))
     alone = {
         "last_rank": last_rank,
         "reason_beyond": _describe_limit(last_rank),
@@ -58,7 +58,7 @@ def single_file_html(content: ReportContent, run: ReportedRun) -> str:
 
 
 def _ids_worst_first(run: ReportedRun) -> list[str]:
-    order = run.experiment_facts.worst_first_ranks.argsort(kind="stable")[:MOST_LISTED_EXPERIMENTS]
+    order = run.experiment_facts.worst_first_ranks.argsort(kind="stable")[: most_listed_experiments(run)]
     return [str(name) for name in run.results["experiment_id"].to_numpy()[order]]
 
 

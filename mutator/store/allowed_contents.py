@@ -19,6 +19,7 @@ ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any
         "reviewed.json",
         "checks.json",
         "progress.json",
+        "envelopes.json",
     ),
     *SIGNATURE_FILES,
     *("golden/*/*", "golden/*.packed", "patches/*.blocks"),

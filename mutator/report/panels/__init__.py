@@ -8,6 +8,7 @@ from typing import NamedTuple
 from mutator._common.extension_doors import STUDY_DOOR
 from mutator.report.panel import Panel, ReportPage
 from mutator.report.panels import (
+    envelopes_panel,
     failed_runs_panel,
     families_panel,
     fault_paths_panel,
@@ -22,6 +23,8 @@ from mutator.report.panels import (
 from mutator.report.reported_run import ReportedRun
 
 PanelBuilder = Callable[[ReportedRun], Panel | None]
+
+LEADING_PANELS: tuple[PanelBuilder, ...] = (envelopes_panel.build_envelopes_panel,)  # before all others
 
 PANELS: tuple[PanelBuilder, ...] = (
     families_panel.build_families_panel,

@@ -9,7 +9,7 @@ from mutator.results.note_without_canary import no_canary_note
 from mutator.results.result_rows import ResultRow
 
 _HTML_TEMPLATE = """\
-<section class="first-screen" aria-label="The worst experiment, and four numbers">
+<section class="first-screen" aria-label="The worst experiment{{ ", and four numbers" if numbers }}">
 {% if no_canary %}
 <p><b>{{ no_canary }}</b></p>
 {% endif %}
@@ -26,6 +26,7 @@ _HTML_TEMPLATE = """\
 <div id="worst-replay"></div>
 </div>
 {% endif %}
+{% if numbers %}
 <div class="key-numbers">
 <ul>
 {% for number in numbers %}
@@ -47,6 +48,7 @@ _HTML_TEMPLATE = """\
 <p class="quiet">{{ note }}</p>
 {% endif %}
 </div>
+{% endif %}
 {% if change %}
 <div class="change">
 <p><b>Since the run before:</b> {{ change.text }} {{ change.advice | marked }}</p>
@@ -66,7 +68,9 @@ _HTML_TEMPLATE = """\
 def build_first_screen_panel(run: ReportedRun) -> Panel:
     worst = worst_row(run)
     frame = run.frame.assign(warning=warning_filter_values(run.frame))
-    numbers, note = key_numbers(frame, has_alerts=run.folder.has_alerts), sample_note(run.folder)
+    # of runs that a search chose, shares say nothing
+    numbers = () if run.explored else key_numbers(frame, has_alerts=run.folder.has_alerts)
+    note = sample_note(run.folder)
     kicker = _words_before_worst_experiment(worst) if worst else ""
     change = describe_change(run)
     lines = [f"* **{number.value}** {number.meaning} ({number.evidence})" for number in numbers]

@@ -102,8 +102,15 @@ def test_a_run_compared_with_itself_has_no_changes(runs: tuple[Path, Path]) -> N
     found = compare_runs(runs[1], runs[1])
     assert found.changed_pairs == ()
     assert not any(fact.is_different for fact in found.facts)
-    assert findings_of_gates(found, [gate for gate in Gate if not gate.value.startswith("severity:")]) == ()
+    others = [g for g in Gate if not g.value.startswith("severity:") and g is not Gate.SMALLER_ENVELOPE]
+    assert findings_of_gates(found, others) == ()
     assert "None of them changed" in comparison_files.summary_text(found)
+
+
+def test_the_gate_on_envelopes_needs_explorations(runs: tuple[Path, Path]) -> None:
+    """A gate that cannot fail must not pass."""
+    with pytest.raises(MutatorError, match="no exploration"):
+        findings_of_gates(compare_runs(*runs), [Gate.SMALLER_ENVELOPE])
 
 
 def test_differing_versions_are_reported(runs: tuple[Path, Path]) -> None:

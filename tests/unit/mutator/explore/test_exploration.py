@@ -93,7 +93,7 @@ def test_an_end_of_the_budget_is_a_prefix() -> None:
     explored, counter = exploration(2), count()
     runs = MadeRuns(explored)
     BatchLoop(
-        exploration=explored, begin=runs.begin, finish=runs.finish, may_begin=lambda: next(counter) < 5
+        exploration=explored, begin=runs.begin, finish=runs.finish, may_begin=lambda batch: next(counter) < 5
     ).run()
     whole = run_whole(2).batches
     assert 0 < len(runs.batches) < len(whole) and runs.batches == whole[: len(runs.batches)]

@@ -1,0 +1,139 @@
+"""Which envelopes of two explorations got smaller, plane by plane."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from mutator._common.message_text import counted
+from mutator.comparison.paired_rate_and_time_sheets import RunDisplayNames
+from mutator.explore.cell_results import CellResult, CellState
+from mutator.explore.envelope import Envelope
+from mutator.explore.envelope_texts import magnitude_text, name_of_plane
+from mutator.statistics.statistics_sheet import Sheet
+
+EnvelopesOfEachRun = tuple[Sequence[Envelope], Sequence[Envelope]]
+_PlaneKey = tuple[str, str, str, bool, int]  # spec, scenario, start, sign, seed
+_MOST_NAMED_PLANES = 5
+_CellValues = tuple[float | None, float]  # magnitude, duration
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnvelopeChange:
+    """A plane of two runs. `decided` is the number of cells of which both runs say what follows.
+
+    `proof` is the run of the smallest, shortest fault that the second run drove to a hazard, or inferred,
+    where the first run calls it without hazard; None if there is none.
+    """
+
+    a: Envelope
+    b: Envelope
+    decided: int
+    became_hazardous: int
+    became_safe: int
+    proof: CellResult | None
+
+    @property
+    def is_smaller(self) -> bool:
+        """Whether a run shows that something that was survived no longer is."""
+        return self.proof is not None
+
+    @property
+    def text(self) -> str:
+        return (
+            f"{name_of_plane(self.b)}: {counted(self.became_hazardous, 'cell')} of {self.decided} became "
+            f"hazardous, {self.became_safe} no longer are"
+        )
+
+
+def compare_envelopes(envelopes: EnvelopesOfEachRun) -> tuple[EnvelopeChange, ...]:
+    """Return the planes that both runs have, in the order of the second run."""
+    before = {_key(envelope): envelope for envelope in envelopes[0]}
+    pairs = ((before.get(_key(envelope)), envelope) for envelope in envelopes[1])
+    return tuple(_change(a, b) for a, b in pairs if a is not None)
+
+
+def planes_only_in(mine: Sequence[Envelope], others: Sequence[Envelope]) -> list[Envelope]:
+    """Return the planes that only the first of two runs has begun."""
+    keys = set(map(_key, others))
+    return [envelope for envelope in mine if _key(envelope) not in keys]
+
+
+def remarks_on_planes(envelopes: EnvelopesOfEachRun, names: RunDisplayNames) -> Iterator[str]:
+    """Yield a remark on the planes that only one of the runs has."""
+    a, b = envelopes
+    for name, only in ((names.a, planes_only_in(a, b)), (names.b, planes_only_in(b, a))):
+        if only:
+            listed = ", ".join(map(name_of_plane, only[:_MOST_NAMED_PLANES]))
+            rest = len(only) - _MOST_NAMED_PLANES
+            yield f"Only {name} has explored: {listed}{f', and {rest} more' if rest > 0 else ''}."
+
+
+def describe_envelope_changes(changes: Sequence[EnvelopeChange]) -> str:
+    """Return how many envelopes got smaller; empty if there are none to compare."""
+    if not changes:
+        return ""
+    smaller = sum(change.is_smaller for change in changes)
+    return f"Of {counted(len(changes), 'envelope')}, {smaller} got smaller."
+
+
+def envelopes_sheet(changes: Sequence[EnvelopeChange], names: RunDisplayNames) -> Sheet:
+    heads = (
+        *("plane", "cells decided in both", "became hazardous", "no longer hazardous"),
+        *(f"survived for every duration, {name}" for name in (names.a, names.b)),
+        "smaller",
+    )
+    lines = tuple(
+        (
+            name_of_plane(change.b),
+            change.decided,
+            change.became_hazardous,
+            change.became_safe,
+            _largest_survived_text(change.a),
+            _largest_survived_text(change.b),
+            "yes" if change.is_smaller else "no",
+        )
+        for change in changes
+    )
+    note = (
+        "Cells of which both runs say whether a hazard follows, with those between runs. An envelope is "
+        f"smaller if {names.b} drove a fault to a hazard, or inferred it, that {names.a} calls survived."
+    )
+    return Sheet(name="envelopes", title="What is survived", note=note, heads=heads, lines=lines)
+
+
+def _key(envelope: Envelope) -> _PlaneKey:
+    plane = envelope.plane
+    is_negative = (envelope.magnitudes[0] or 0.0) < 0
+    return plane.spec, plane.scenario, plane.start, is_negative, plane.seed
+
+
+def _change(a: Envelope, b: Envelope) -> EnvelopeChange:
+    before = _state_by_values(a)
+    decided = became_hazardous = became_safe = 0
+    proof: CellResult | None = None
+    for i, j, values in _cells(b):
+        was, now = before.get(values, CellState.UNKNOWN), b.cells[i][j]
+        if not all(state.is_hazardous or state.is_without_hazard for state in (was, now)):
+            continue
+        decided += 1
+        became_safe += was.is_hazardous and now.is_without_hazard
+        if was.is_without_hazard and now.is_hazardous:
+            became_hazardous += 1
+            proof = proof or b.exploration.map.proof_of((i, j))
+    return EnvelopeChange(
+        a=a, b=b, decided=decided, became_hazardous=became_hazardous, became_safe=became_safe, proof=proof
+    )
+
+
+def _state_by_values(envelope: Envelope) -> Mapping[_CellValues, CellState]:
+    return {values: envelope.cells[i][j] for i, j, values in _cells(envelope)}
+
+
+def _cells(envelope: Envelope) -> Iterator[tuple[int, int, _CellValues]]:
+    for i, magnitude in enumerate(envelope.magnitudes):
+        for j, duration_s in enumerate(envelope.durations_s):
+            yield i, j, (magnitude, duration_s)
+
+
+def _largest_survived_text(envelope: Envelope) -> str:
+    survived = envelope.largest_survived()
+    return "-" if survived is None else magnitude_text(envelope, survived)
