@@ -9,9 +9,11 @@ from pathlib import Path
 import pytest
 
 import mutator
-from mutator import MutatorError, Run, RunExperiment, SmallestForm, Workspace
+from mutator import CheckFailed, MutatorError, Run, RunExperiment, SmallestForm, Workspace
+from mutator.api import shrinks
 from mutator.campaigns.regression_files import load_regressions
 from mutator.execution.bench import Bench
+from mutator.store.run_folder import RunFolder
 
 _SPEC = """\
 schema: fault_spec/1
@@ -153,6 +155,24 @@ def test_a_fault_that_latches_is_not_shortened(run: Run, tmp_path: Path) -> None
     assert form.experiment.trigger.hold_s is None
     assert "declares the hold `to_end`" in form.notes[0]
     assert form.minimal == "nothing smaller can be tried"
+
+
+def test_a_result_that_the_reference_engine_contradicts_is_refused(
+    run: Run, smallest: SmallestForm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The smallest form is driven again there, unless it is in the proved sample."""
+    monkeypatch.setattr(shrinks, "rerun_experiment", lambda *arguments, **options: (None, False))
+    monkeypatch.setattr(shrinks, "PROOF_FOLDER", "nothing")
+    with pytest.raises(CheckFailed, match="differs on the reference engine"):
+        experiment(run, 2.4, "B").shrink()
+
+
+def test_an_unfinished_run_is_refused(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Its results are not proved."""
+    hazardous = experiment(run, 2.4, "B")
+    monkeypatch.setattr(RunFolder, "is_finished", False)
+    with pytest.raises(MutatorError, match="this run is not finished"):
+        hazardous.shrink(tmp_path / "out")
 
 
 def test_what_cannot_be_shrunk_is_refused(run: Run, tmp_path: Path) -> None:
