@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.argument_checks import check_whole_number
-from mutator.api.campaigns import describe_unfinished
 from mutator.api.experiments import ExperimentBuilder, checked_after_hazard
 from mutator.api.runs import Run
 from mutator.api.scenario_choice import ScenarioLike
@@ -195,7 +194,7 @@ def warn_of_end(summary: Summary | None) -> None:
         text = summary.golden_hazards_note if summary.has_left_out_all else text
         warnings.warn(text, MutatorWarning, stacklevel=4)
     else:
-        warnings.warn(describe_unfinished(summary), IncompleteRun, stacklevel=4)
+        warnings.warn(summary.describe_unfinished(), IncompleteRun, stacklevel=4)
 
 
 def bench_values(

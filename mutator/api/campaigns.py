@@ -4,13 +4,14 @@ import warnings
 from pathlib import Path
 
 from mutator._common.argument_checks import check_type, check_whole_number
+from mutator.api.exploring_campaigns import explore_campaign
 from mutator.api.runs import Run
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
+from mutator.campaigns.campaign_files import load_campaign
 from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import IncompleteRun, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.distributor_choice import choose_distributor
-from mutator.execution.session_summary import Summary
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
@@ -64,6 +65,22 @@ def run(
         check_type("choices", choices, Choices, "mutator.Choices")
     _check_since(since, cluster, reuse=reuse)
     opened_workspace, folder = open_workspace(workspace), Path(out)
+    loaded = load_campaign(opened_workspace.campaign(campaign))
+    if loaded.exploration_request is not None:
+        options = {"reviewed": reviewed, "accept_versions": accept_versions, "since": since is not None}
+        return explore_campaign(
+            opened_workspace,
+            loaded,
+            folder,
+            choices=choices or Choices(),
+            refused=[name for name, is_set in (options | {"last_failed": last_failed}).items() if is_set],
+            workers=max(workers, 1),
+            engine=engine,
+            reuse=reuse,
+            cluster=cluster,
+            insecure_network=insecure_network,
+            progress=progress,
+        )
     summary = run_campaign(
         opened_workspace,
         campaign,
@@ -80,7 +97,7 @@ def run(
         notify=progress,
     )
     if summary.exit_code:
-        warnings.warn(describe_unfinished(summary), IncompleteRun, stacklevel=2)
+        warnings.warn(summary.describe_unfinished(), IncompleteRun, stacklevel=2)
     return Run(RunFolder.open(folder), opened_workspace, summary)
 
 
@@ -97,17 +114,3 @@ def _check_since(since: str | Path | None, cluster: str | None, *, reuse: bool) 
             argument="since",
             remedy="leave out one of them: without `reuse`, every experiment runs",
         )
-
-
-def describe_unfinished(summary: Summary) -> str:
-    if summary.has_left_out_all:
-        return summary.golden_hazards_note
-    parts = [f"experiments with a result: {summary.done} of {summary.planned}"]
-    if summary.harness_errors:
-        name, detail = summary.harness_errors[0]
-        parts.append(f"harness errors: {len(summary.harness_errors)} (first: {name}: {detail})")
-    if summary.problem:
-        parts.append(summary.problem)
-    if summary.interrupted:
-        parts.append("interrupted")
-    return "; ".join(parts) + "; the same call resumes the run"

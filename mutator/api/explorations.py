@@ -1,46 +1,39 @@
 """Explorations: how large and how long a fault may be before a hazard follows."""
 
-import math
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar, cast, overload
+from typing import Literal, TypeVar, cast, overload
 
 from mutator._common.argument_checks import check_number, check_whole_number
 from mutator._common.message_text import describe_choices
 from mutator.api.benches import bench_values, distributor_of_cluster, warn_of_end
-from mutator.api.experiments import ExperimentBuilder
+from mutator.api.exploration_benches import (
+    SEARCHED_DURATIONS,
+    SEARCHED_MAGNITUDES,
+    experiment_builder,
+    explore_envelopes,
+    opened_exploration,
+    within_budget,
+)
 from mutator.api.exploration_planes import chosen_planes
 from mutator.api.run_envelopes import RunEnvelope, envelopes_of_replay
 from mutator.api.scenario_choice import ScenarioLike
 from mutator.api.target_and_fault_selection import (
-    SelectedTarget,
     TriggerLike,
     WorkspaceLike,
     open_workspace,
 )
 from mutator.campaigns.exploration_section import STRATEGIES, ExplorationSection, ExploredPlane
-from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.errors import MutatorError
-from mutator.execution.bench import Bench
-from mutator.execution.bench_opening import finishing, opened_bench
-from mutator.execution.distributor_choice import Distributor
 from mutator.execution.session_summary import Summary
-from mutator.explore.envelope_files import delete_envelopes, write_envelopes
-from mutator.explore.exploration import Exploration
-from mutator.explore.exploration_replay import ExplorationReplay
-from mutator.explore.exploration_run import BuildExperiment, find_drives, run_exploration
+from mutator.explore.exploration_run import find_drives, run_exploration
 from mutator.explore.finding_search import Finding, FindingSearch, dominated_share
-from mutator.model import AfterHazard, Experiment
 from mutator.store.run_progress import ProgressCallback
-from mutator.targets.stop_at_hazard_code import can_stop_at_hazard
 
 DEFAULT_POINTS, DEFAULT_LONGEST_S, DEFAULT_OBSERVE_S = 51, 15.0, 15.0
 _ENVELOPE_PURPOSE = "How large and how long faults may be before a hazard follows."
 _SEARCH_PURPOSE = "Which faults cause hazards, and how small and how short they can be."
-_SEARCHED_MAGNITUDES, _SEARCHED_DURATIONS = 16, 9
 _T = TypeVar("_T")
 
 
@@ -126,7 +119,7 @@ def envelope(
     section = ExplorationSection(
         planes=list(planes), observe_s=float(observe_s), search=search, validation=validation
     )
-    with _opened_bench(
+    with opened_exploration(
         selected_target,
         {**values, "name": "envelope", "about": _ENVELOPE_PURPOSE},
         section,
@@ -137,14 +130,9 @@ def envelope(
         distributor=distributor_of_cluster(cluster, insecure_network=insecure_network),
         progress=progress,
     ) as bench:
-        build = _builder(selected_target, values["reading"])
-        drives = find_drives(bench, selected_target.manifest, section, build)
-        exploration = Exploration(section=section, drives=drives, seed=seed)
-        delete_envelopes(bench.path)  # a kill must not leave those of fewer runs
-        run_exploration(bench, exploration, build, _within(budget_s))
-        explored = ExplorationReplay(exploration)
-        if explored.envelopes:
-            write_envelopes(bench.path, explored)
+        explored = explore_envelopes(
+            bench, section, selected_target, values["reading"], within_budget(budget_s)
+        )
     warn_of_end(bench.summary)
     return Envelopes(run=Path(out), envelopes=envelopes_of_replay(explored), summary=bench.summary)
 
@@ -211,13 +199,13 @@ def search(
         _listed(specs),
         _listed(scenarios),
         _listed(starts),
-        magnitude_count=_SEARCHED_MAGNITUDES,
-        duration_count=_SEARCHED_DURATIONS,
+        magnitude_count=SEARCHED_MAGNITUDES,
+        duration_count=SEARCHED_DURATIONS,
         longest_s=longest_s,
         seed=seed,
     )
     section = ExplorationSection(planes=list(planes), goal="find", strategy=strategy, budget=budget)
-    with _opened_bench(
+    with opened_exploration(
         selected_target,
         {**values, "name": "search", "about": _SEARCH_PURPOSE},
         section,
@@ -228,10 +216,10 @@ def search(
         distributor=distributor_of_cluster(cluster, insecure_network=insecure_network),
         progress=progress,
     ) as bench:
-        build = _builder(selected_target, values["reading"])
+        build = experiment_builder(selected_target, values["reading"])
         drives = find_drives(bench, selected_target.manifest, section, build)
         searched = FindingSearch(section=section, drives=drives, seed=seed)
-        run_exploration(bench, searched, build, _within(None))
+        run_exploration(bench, searched, build, within_budget(None))
     warn_of_end(bench.summary)
     return Findings(
         run=Path(out),
@@ -240,68 +228,6 @@ def search(
         dominated=sum(map(dominated_share, searched.planes)),
         summary=bench.summary,
     )
-
-
-@contextmanager
-def _opened_bench(
-    selected_target: SelectedTarget,
-    values: Mapping[str, Any],
-    section: ExplorationSection,
-    out: Path,
-    *,
-    workers: int,
-    engine: str | None,
-    reuse: bool,
-    distributor: Distributor | None,
-    progress: ProgressCallback | None,
-) -> Iterator[Bench]:
-    """Open the bench of an exploration, and finish it at the end of the block."""
-    check_whole_number("workers", workers, least=1)
-    check_engine_is_offered(engine)
-    with (
-        opened_bench(
-            selected_target.workspace,
-            out,
-            {**values, "after_hazard": _after_hazard(selected_target).value, "explore": asdict(section)},
-            workers=workers,
-            engine=engine,
-            reuse=reuse,
-            distributor=distributor,
-            notify=progress,
-        ) as bench,
-        finishing(bench),
-    ):
-        yield bench
-
-
-def _builder(selected_target: SelectedTarget, reading: str) -> BuildExperiment:
-    builder, after_hazard = ExperimentBuilder(selected_target), _after_hazard(selected_target)
-
-    def build(plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float) -> Experiment:
-        return builder.build(
-            plane.spec,
-            plane.scenario,
-            start_s,
-            value=magnitude,
-            hold_s=duration_s,
-            seed=plane.seed,
-            reading=reading,
-            after_hazard=after_hazard,
-            beyond=True,
-        )
-
-    return build
-
-
-def _after_hazard(selected_target: SelectedTarget) -> AfterHazard:
-    """Return whether runs go on after a terminal hazard: what follows decides nothing, and costs time."""
-    return AfterHazard.STOP if can_stop_at_hazard(selected_target.manifest) else AfterHazard.GO_ON
-
-
-def _within(budget_s: float | None) -> Callable[[], bool]:
-    """Return what says whether less than `budget_s` has passed since now."""
-    end = math.inf if budget_s is None else time.monotonic() + budget_s
-    return lambda: time.monotonic() < end
 
 
 def _listed(values: _T | Sequence[_T]) -> list[_T]:

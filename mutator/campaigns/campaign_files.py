@@ -17,7 +17,7 @@ from mutator.campaigns.campaign_triggers import (
     with_trigger_list_under_key,
 )
 from mutator.campaigns.expectations import Expectation
-from mutator.campaigns.exploration_section import ExplorationSection
+from mutator.campaigns.exploration_section import ExplorationRequest, ExplorationSection
 from mutator.campaigns.installed_studies import CheckableStudy, load_installed_study
 from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.config.yaml_files import load_yaml_model
@@ -89,6 +89,7 @@ class Campaign:
     include: GoldenClass | None = None  # scenarios that run although their golden run has a hazard
     is_bench: bool = False  # what a bench fixed when it was opened; its experiments come in batches
     exploration: ExplorationSection | None = None  # what a bench explores; None if others decide
+    exploration_request: ExplorationRequest | None = None  # what a campaign explores; None if it lists faults
 
     @property
     def seed(self) -> int:
@@ -204,6 +205,7 @@ def load_campaign(path: Path) -> Campaign:
         yaml_source=source,
         expectation=model.expect,
         include=GoldenClass(model.include) if model.include else None,
+        exploration_request=model.explore,
     )
 
 

@@ -24,6 +24,7 @@ from mutator.campaigns.campaign_triggers import (
     to_value_by_reading,
 )
 from mutator.campaigns.expectations import Expectation
+from mutator.campaigns.exploration_section import ExplorationRequest
 from mutator.campaigns.operator_selection import MutantActivity
 from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.families.scenario_sampling import SAMPLING_METHODS
@@ -197,6 +198,11 @@ class CampaignModel(StrictModel, title="The file"):
     triggers: Triggers | None = Field(
         None, description="When faults become active. Required unless `faults` is empty."
     )
+    explore: YamlRecord[ExplorationRequest] | None = Field(
+        None,
+        description="Explore the faults instead of running the values that the specs list: results decide "
+        "which experiments follow. Without `triggers`, `methods`, `setting` and `sample`.",
+    )
     sample: int | None = Field(
         None,
         ge=1,
@@ -256,7 +262,9 @@ class CampaignModel(StrictModel, title="The file"):
             raise ValueError("`sample`, the number of experiments, together with `proportional`")
         if self.proportional and any(selection.operators for selection in self.faults):
             raise ValueError("no `proportional` with `operators`, which have their own `sample`")
-        if bool(self.faults) is not (self.triggers is not None):
+        if self.explore is not None:
+            self._check_exploration()
+        elif bool(self.faults) is not (self.triggers is not None):
             raise ValueError("`triggers`, because there are `faults`" if self.faults else "no `triggers`")
         if not self.faults and self.canary is None:
             raise ValueError("a `canary`, without which nothing shows that a hazard can be reached")
@@ -269,3 +277,18 @@ class CampaignModel(StrictModel, title="The file"):
         if Method.RANDOM in self.methods and self.triggers and self.triggers.random_until_s is None:
             raise ValueError("`random_until_s` in `triggers` for random times")
         return self
+
+    def _check_exploration(self) -> None:
+        others = {
+            "triggers": self.triggers,
+            "sample": self.sample,
+            "expect": self.expect,
+            "setting": any(self.setting.values()),
+            "methods": self.methods != [Method.GUIDED],
+            "seeds": self.seeds,
+        }
+        for key, value in others.items():
+            if value:
+                raise ValueError(f"no `{key}` with `explore`")
+        if not self.faults or any(selection.spec is None or selection.values for selection in self.faults):
+            raise ValueError("`faults` with a `spec` each, and without `values`, with `explore`")

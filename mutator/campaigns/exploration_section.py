@@ -96,3 +96,65 @@ class ExplorationSection:
     batch: int = field(
         default=16, metadata=yaml_metadata("The most experiments of a batch.", ge=1, le=10_000)
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExplorationRequest:
+    """What a campaign explores: its faults in its scenarios, from these starts on."""
+
+    __pydantic_config__ = pydantic_mapping_config("What is explored")
+
+    goal: Literal["envelope", "find"] = field(
+        default="envelope",
+        metadata=yaml_metadata(
+            "`envelope`: [what is survived](../how-to/find-what-is-survived.md) of each fault, by magnitude "
+            "and duration. `find`: small and short hazardous faults among all."
+        ),
+    )
+    starts: list[float | str] = field(
+        metadata=yaml_metadata(
+            "When faults begin: times in s, or contexts, which mean the first time that the golden run is in "
+            "them.",
+            min_length=1,
+        )
+    )
+    points: int = field(
+        default=51,
+        metadata=yaml_metadata(
+            "Of `envelope`: at most this many magnitudes, and durations.", ge=2, le=_MOST_POINTS
+        ),
+    )
+    longest_s: float = field(
+        default=15.0, metadata=yaml_metadata("The longest duration, in s.", gt=0, le=MOST_LIMIT_OR_TIME)
+    )
+    observe_s: float = field(
+        default=15.0,
+        metadata=yaml_metadata(
+            "How long a drive must go on after a fault to count as without hazard, in s.",
+            ge=0,
+            le=MOST_LIMIT_OR_TIME,
+        ),
+    )
+    search: int = field(
+        default=120,
+        metadata=yaml_metadata("Of `envelope`: the most runs of the search of a plane.", ge=1, le=100_000),
+    )
+    validation: int = field(
+        default=86,
+        metadata=yaml_metadata(
+            "Of `envelope`: how many cells of each plane are drawn from those called without hazard. 0: "
+            "none.",
+            ge=0,
+            le=100_000,
+        ),
+    )
+    strategy: Literal["planes", "random"] = field(
+        default="planes",
+        metadata=yaml_metadata("Of `find`: `planes` learns from results; `random` draws faults, to compare."),
+    )
+    budget: int = field(
+        default=300, metadata=yaml_metadata("Of `find`: the number of runs.", ge=1, le=1_000_000)
+    )
+    batch: int = field(
+        default=16, metadata=yaml_metadata("The most experiments of a batch.", ge=1, le=10_000)
+    )

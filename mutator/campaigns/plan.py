@@ -165,6 +165,13 @@ class SeedBySeedPlan:
         self.choices = Choices() if choices is None else choices
         check_type("choices", self.choices, Choices, "mutator.Choices")
         self.campaign = load_campaign(workspace.campaign(campaign))
+        if self.campaign.exploration_request is not None:
+            raise self.campaign.error(
+                ("explore",),
+                f"campaign {self.campaign.name} explores, so results decide which experiments follow",
+                expected="a campaign whose experiments can be planned",
+                remedy="run it with `mutator run` or `mutator.run`",
+            )
         self.seeds = _selected_seeds(self.campaign, self.choices)
         readings = workspace.readings()
         check_readings(self.campaign, readings)

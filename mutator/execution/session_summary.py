@@ -73,6 +73,20 @@ class Summary:
             return f"none is needed, because no experiment was forked: {self.not_forked}"
         return str(self.proof) if self.proof else ""
 
+    def describe_unfinished(self) -> str:
+        """Return why not all experiments have a result."""
+        if self.has_left_out_all:
+            return self.golden_hazards_note
+        parts = [f"experiments with a result: {self.done} of {self.planned}"]
+        if self.harness_errors:
+            name, detail = self.harness_errors[0]
+            parts.append(f"harness errors: {len(self.harness_errors)} (first: {name}: {detail})")
+        if self.problem:
+            parts.append(self.problem)
+        if self.interrupted:
+            parts.append("interrupted")
+        return "; ".join(parts) + "; the same call resumes the run"
+
     @property
     def has_left_out_all(self) -> bool:
         """Whether every experiment was left out, because its golden run has a hazard."""

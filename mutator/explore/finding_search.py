@@ -28,10 +28,10 @@ class Finding:
     `plane` is the number of the plane. `cell` has the least product of magnitude and duration.
     """
 
-    plane: int
-    hazard: str
-    cell: Cell
-    result: CellResult
+    plane: int  #: the number of the plane
+    hazard: str  #: the hazard
+    cell: Cell  #: the numbers of magnitude and duration
+    result: CellResult  #: the experiment, and when the hazard came
 
 
 @dataclass(slots=True)

@@ -132,6 +132,52 @@ def test_a_search_names_what_it_found(toycar: Workspace, tmp_path: Path) -> None
     assert len(run.records) == 14 and run.verify().differences == ()
 
 
+_CAMPAIGN = """
+schema: campaign/1
+name: exploring
+about: How wrong the lane sensor may be.
+target: toycar
+scenarios: [A]
+faults: [{spec: sensor/lane/*}]
+explore: {goal: envelope, starts: [1], points: 4, longest_s: 3, observe_s: 0.5, validation: 2}
+seed: 3
+canary: {spec: sensor/lane/shifted, scenario: A, hazard: H3, at_s: 0.5}
+"""
+
+
+@pytest.mark.usefixtures("kept_checks")
+def test_a_campaign_explores(toycar: Workspace, tmp_path: Path) -> None:
+    """`run` explores, and resumes with nothing to do; verbs that need a plan, and filters, are refused."""
+    path = tmp_path / "exploring.yaml"
+    path.write_text(_CAMPAIGN)
+    run = mutator.run(path, tmp_path / "run", workspace=toycar)
+    assert run.summary and run.summary.exit_code == 0 and run.seal and len(run.records) > 8
+    assert run.folder.head.campaign == "exploring"
+    assert mutator.run(path, tmp_path / "run", workspace=toycar).seal == run.seal
+    with pytest.raises(mutator.MutatorError, match="results decide which experiments follow"):
+        mutator.plan(path, workspace=toycar)
+    with pytest.raises(mutator.MutatorError, match="`limit` for campaign exploring, which explores"):
+        mutator.run(path, tmp_path / "other", choices=mutator.Choices(limit=3), workspace=toycar)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("seed: 3", "seed: 3\ntriggers: [always]", "no `triggers` with `explore`"),
+        ("seed: 3", "seeds: {from: 1, to: 2}", "no `seeds` with `explore`"),
+        ("spec: sensor/lane/*", "spec: sensor/lane/*, values: 3", "without `values`, with `explore`"),
+        ("starts: [1]", "starts: []", "starts"),
+    ],
+)
+def test_an_exploring_campaign_is_checked(
+    toycar: Workspace, tmp_path: Path, old: str, new: str, text: str
+) -> None:
+    path = tmp_path / "exploring.yaml"
+    path.write_text(_CAMPAIGN.replace(old, new))
+    with pytest.raises(mutator.MutatorError, match=text):
+        mutator.run(path, tmp_path / "run", workspace=toycar)
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [

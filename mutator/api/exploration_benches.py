@@ -1,0 +1,114 @@
+"""The bench of an exploration: how it is opened, and how the experiments of planes are built."""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from mutator._common.argument_checks import check_whole_number
+from mutator.api.experiments import ExperimentBuilder
+from mutator.api.target_and_fault_selection import SelectedTarget
+from mutator.campaigns.exploration_section import ExplorationSection, ExploredPlane
+from mutator.engines.engine_choice import check_engine_is_offered
+from mutator.execution.bench import Bench
+from mutator.execution.bench_opening import finishing, opened_bench
+from mutator.execution.distributor_choice import Distributor
+from mutator.explore.envelope_files import delete_envelopes, write_envelopes
+from mutator.explore.exploration import Exploration
+from mutator.explore.exploration_replay import ExplorationReplay
+from mutator.explore.exploration_run import BuildExperiment, find_drives, run_exploration
+from mutator.model import AfterHazard, Experiment, Fault
+from mutator.store.run_progress import ProgressCallback
+from mutator.targets.stop_at_hazard_code import can_stop_at_hazard
+
+SEARCHED_MAGNITUDES, SEARCHED_DURATIONS = 16, 9  # of a plane in a search for findings
+
+
+@contextmanager
+def opened_exploration(
+    selected_target: SelectedTarget,
+    values: Mapping[str, Any],
+    section: ExplorationSection,
+    out: Path,
+    *,
+    workers: int,
+    engine: str | None,
+    reuse: bool,
+    distributor: Distributor | None,
+    progress: ProgressCallback | None,
+) -> Iterator[Bench]:
+    """Open the bench of an exploration, and finish it at the end of the block."""
+    check_whole_number("workers", workers, least=1)
+    check_engine_is_offered(engine)
+    with (
+        opened_bench(
+            selected_target.workspace,
+            out,
+            {**values, "after_hazard": after_hazard_of(selected_target).value, "explore": asdict(section)},
+            workers=workers,
+            engine=engine,
+            reuse=reuse,
+            distributor=distributor,
+            notify=progress,
+        ) as bench,
+        finishing(bench),
+    ):
+        yield bench
+
+
+def explore_envelopes(
+    bench: Bench,
+    section: ExplorationSection,
+    selected_target: SelectedTarget,
+    reading: str,
+    may_begin: Callable[[], bool],
+) -> ExplorationReplay:
+    """Explore the planes of a section on its open bench, and write what is survived of each."""
+    build = experiment_builder(selected_target, reading)
+    drives = find_drives(bench, selected_target.manifest, section, build)
+    exploration = Exploration(section=section, drives=drives, seed=section.planes[0].seed)
+    delete_envelopes(bench.path)  # a kill must not leave those of fewer runs
+    run_exploration(bench, exploration, build, may_begin)
+    explored = ExplorationReplay(exploration)
+    if explored.envelopes:
+        write_envelopes(bench.path, explored)
+    return explored
+
+
+def experiment_builder(selected_target: SelectedTarget, reading: str) -> BuildExperiment:
+    """Return what builds the experiments of planes. How long a fault lasts is the plane's, whatever its spec
+    declares.
+    """
+    builder, after_hazard = ExperimentBuilder(selected_target), after_hazard_of(selected_target)
+
+    @cache
+    def fault_of(spec: str, magnitude: float | None, seed: int) -> Fault:
+        fault = selected_target.fault(spec, value=magnitude, seed=seed, reading=reading, beyond=True)
+        return replace(fault, hold=None)
+
+    def build(plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float) -> Experiment:
+        return builder.build(
+            fault_of(plane.spec, magnitude, plane.seed),
+            plane.scenario,
+            start_s,
+            hold_s=duration_s,
+            seed=plane.seed,
+            after_hazard=after_hazard,
+        )
+
+    return build
+
+
+def after_hazard_of(selected_target: SelectedTarget) -> AfterHazard:
+    """Return whether runs go on after a terminal hazard: what follows decides nothing, and costs time."""
+    return AfterHazard.STOP if can_stop_at_hazard(selected_target.manifest) else AfterHazard.GO_ON
+
+
+def within_budget(budget_s: float | None) -> Callable[[], bool]:
+    """Return what says whether less than `budget_s` has passed since now."""
+    end = math.inf if budget_s is None else time.monotonic() + budget_s
+    return lambda: time.monotonic() < end
