@@ -18,7 +18,7 @@ from mutator.audit.seal_signatures import sign_seal as write_signature
 from mutator.audit.seal_signatures import verified_signer
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import draw_experiment_ids, rerun_and_compare
-from mutator.explore.envelope_files import envelope_file_problems
+from mutator.explore.envelope_files import ENVELOPES_FILE, envelope_file_problems
 from mutator.explore.exploration_replay import is_exploration, replay_exploration
 from mutator.report.report_audit import audit_report
 from mutator.store.run_folder import RunFolder
@@ -217,7 +217,7 @@ def _exploration_checks(
 ) -> list[AuditCheck]:
     """Replay an exploration; nothing for other runs, and without the library, which reads golden runs."""
     try:
-        if workspace is None or not is_exploration(folder):
+        if workspace is None or not (is_exploration(folder) or (folder.path / ENVELOPES_FILE).exists()):
             return []
         manifest = workspace.manifest(folder.head.target)
     except MutatorError:  # other checks report a damaged file and a missing target

@@ -131,14 +131,17 @@ class Envelope:
     def largest_survived(self, duration_s: float | None = None) -> float | None:
         """Return the magnitude up to which all are survived for every duration up to this one (that of the
         first cell that is at least as long), by default for every duration that leaves time to observe what
-        follows; None if the smallest is not, or if no cell is as long.
+        follows, and without a hazard for longer ones; None if the smallest is not, or if no cell is as long.
         """
         if duration_s is not None and duration_s > self.durations_s[-1]:
             return None
         count = self.columns_up_to(duration_s)
         survived = None
         for magnitude, line in zip(self.magnitudes, self.cells, strict=True):
-            if not all(state.is_without_hazard for state in line[:count]):
+            longer = line[count:] if duration_s is None else ()
+            if not all(state.is_without_hazard for state in line[:count]) or any(
+                state.is_hazardous for state in longer
+            ):
                 break
             survived = magnitude
         return survived

@@ -50,14 +50,15 @@ def hazardous_share(envelope: Envelope) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValidationCount:
-    """What a validation found: of `drawn` cells out of `frame`, `driven` were driven, of which `failed` were
-    hazardous or could not be decided.
+    """What a validation found: of `drawn` cells out of `frame`, `driven` were driven, of which some were
+    `hazardous` and some `undecided`.
     """
 
     frame: int
     drawn: int
     driven: int
-    failed: int
+    hazardous: int
+    undecided: int = 0
 
     @property
     def is_complete(self) -> bool:
@@ -71,18 +72,19 @@ class ValidationCount:
     @property
     def most_hazardous_share(self) -> float:
         """The upper limit of the share of hazardous cells, at `CONFIDENCE_OF_EACH_LOOK`: exact, for a draw
-        without replacement.
+        without replacement. Cells that were not decided count as hazardous.
         """
-        low, high = self.failed, self.frame - self.drawn + self.failed
+        failed = self.hazardous + self.undecided
+        low, high = failed, self.frame - self.drawn + failed
         while low < high:  # the largest number of hazardous cells that is not refuted
             middle = (low + high + 1) // 2
-            if self._probability_of_at_most_failed(middle) > 1 - CONFIDENCE_OF_EACH_LOOK:
+            if self._probability_of_at_most(failed, middle) > 1 - CONFIDENCE_OF_EACH_LOOK:
                 low = middle
             else:
                 high = middle - 1
         return low / self.frame if self.frame else 0.0
 
-    def _probability_of_at_most_failed(self, hazardous: int) -> float:
+    def _probability_of_at_most(self, failed: int, hazardous: int) -> float:
         least = max(0, self.drawn - (self.frame - hazardous))
         total = _log_of_choices(self.frame, self.drawn)
         return sum(
@@ -91,7 +93,7 @@ class ValidationCount:
                 + _log_of_choices(self.frame - hazardous, self.drawn - count)
                 - total
             )
-            for count in range(least, self.failed + 1)
+            for count in range(least, failed + 1)
         )
 
 
@@ -102,7 +104,8 @@ def count_validation(envelope: Envelope, validation: Validation) -> ValidationCo
         frame=validation.frame_size,
         drawn=len(results),
         driven=len(driven),
-        failed=sum(state is not CellState.WITHOUT_HAZARD for state in driven),
+        hazardous=driven.count(CellState.HAZARDOUS),
+        undecided=driven.count(CellState.NOT_DECIDED),
     )
 
 

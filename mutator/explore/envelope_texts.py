@@ -75,9 +75,14 @@ def describe_validation(envelope: Envelope) -> str:
 def findings_table(findings: Sequence[Finding], planes: Sequence[ExploredPlane]) -> TextTable:
     """Return a row for each finding, those of the shortest faults first."""
     heads = ("fault", "scenario", "from", "hazard", "smallest", "for", "hazard after", "experiment")
-    ordered = sorted(findings, key=lambda finding: (_duration_s(finding, planes), finding.plane))
+    ordered = shortest_first(findings, planes)
     rows = [_finding_row(finding, planes[finding.plane]) for finding in ordered]
     return TextTable(heads=heads, rows=rows, right_aligned=(4, 5, 6))
+
+
+def shortest_first(findings: Sequence[Finding], planes: Sequence[ExploredPlane]) -> list[Finding]:
+    """Return the findings, those of the shortest faults first."""
+    return sorted(findings, key=lambda finding: (_duration_s(finding, planes), finding.plane))
 
 
 def _finding_row(finding: Finding, plane: ExploredPlane) -> list[str]:

@@ -19,7 +19,7 @@ from mutator.explore.exploration import BatchLoop, BatchProposer, Exploration, P
 from mutator.explore.finding_search import FindingSearch
 from mutator.explore.golden_drives import drive_of, load_observed_values
 from mutator.families.family import argument_of
-from mutator.model import Experiment, Hold, Record, Status
+from mutator.model import AfterHazard, Experiment, Hold, Record, Status
 from mutator.store import plan_file
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_file import BATCHES_FILE, EXPERIMENTS_FILE
@@ -85,7 +85,7 @@ def replay_exploration(folder: RunFolder, manifest: TargetManifest) -> Explorati
     if campaign.exploration is None:
         raise MutatorError("no exploration", where=campaign.path, expected="a bench with the key `explore`")
     _check_lattices(campaign.exploration, campaign.path)
-    plan = _ExploredPlan(folder)
+    plan = _ExploredPlan(folder, campaign.after_hazard)
     drives = _drives_of_planes(manifest, campaign.exploration, plan)
     proposer = FindingSearch if campaign.exploration.goal == "find" else Exploration
     exploration = proposer(section=campaign.exploration, drives=drives, seed=campaign.seed)
@@ -118,13 +118,13 @@ def _check_lattices(section: ExplorationSection, path: Path) -> None:
 class _ExploredPlan:
     """The plan of a run folder: experiments by what their cells say, and batches."""
 
-    def __init__(self, folder: RunFolder) -> None:
+    def __init__(self, folder: RunFolder, after_hazard: AfterHazard) -> None:
         self.folder = folder
         self.ids: list[str] = []
         self.keys: list[_CellKey] = []
         self.golden_by_key: dict[_GoldenKey, GoldenRun] = {}
         for experiment in plan_file.iterate_experiments(folder.path):
-            key = _key_of_experiment(experiment)
+            key = _key_of_experiment(experiment, after_hazard)
             self.ids.append(experiment.id)
             self.keys.append(key)
             self.golden_by_key.setdefault((key[0], key[2], key[5]), folder.golden_run_of(experiment))
@@ -219,9 +219,10 @@ class _ReplayedPlan:
         )
 
 
-def _key_of_experiment(experiment: Experiment) -> _CellKey:
+def _key_of_experiment(experiment: Experiment, after_hazard: AfterHazard) -> _CellKey:
     trigger = experiment.trigger
     is_from_time_on = trigger.hold is Hold.FOR and trigger.armed_after_s == 0.0 and not experiment.setting
+    is_from_time_on &= experiment.after_hazard is after_hazard
     return (
         experiment.fault.spec,
         experiment.fault.value,

@@ -19,7 +19,7 @@ from mutator.explore.envelope_failures import (
 )
 from mutator.explore.envelope_texts import TABLE_DURATIONS_S, fault_text, magnitude_text, start_text
 from mutator.explore.exploration_replay import ExplorationReplay, is_exploration, replay_exploration
-from mutator.explore.finding_search import FindingSearch
+from mutator.report.search_findings import SearchFindings
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -63,8 +63,10 @@ class ExploredPlanes:
     problem: str = ""
 
     @classmethod
-    def of_run(cls, folder: RunFolder, workspace: Workspace | None) -> "ExploredPlanes | None":
-        """Return those of a run; None for a run without an exploration."""
+    def of_run(
+        cls, folder: RunFolder, workspace: Workspace | None
+    ) -> "ExploredPlanes | SearchFindings | None":
+        """Return those of a run, or the findings of a search; None for a run without an exploration."""
         if not is_exploration(folder):
             return None
         if workspace is None:
@@ -74,8 +76,8 @@ class ExploredPlanes:
         except (MutatorError, KeyError) as error:
             return cls(envelopes=(), problem=f"The envelopes cannot be shown: {error}")
         about = {hazard.name: hazard.about for hazard in folder.head.about_hazards}
-        if not replay.envelopes and not replay.differences and isinstance(replay.exploration, FindingSearch):
-            return None
+        if not replay.differences and (findings := SearchFindings.of_replay(replay)):
+            return findings
         return cls.of_replay(replay, about)
 
     @classmethod
@@ -132,14 +134,17 @@ def describe_plane_validation(envelope: Envelope) -> str:
     if not count.drawn:
         return "Nothing to validate: each cell called without hazard was driven."
     drawn = counted(count.drawn, "drawn cell")
+    hazardous = f"hazardous, {count.undecided} not decided" if count.undecided else "hazardous"
     if not count.is_complete:
-        return f"Validation unfinished: {count.driven} of {drawn} driven, {count.failed} of them hazardous."
+        return (
+            f"Validation unfinished: {count.driven} of {drawn} driven, {count.hazardous} of them {hazardous}."
+        )
     if count.is_census:
-        return f"{count.failed} of {drawn} hazardous: these are all cells called without hazard."
+        return f"{count.hazardous} of {drawn} {hazardous}: these are all cells called without hazard."
     percent = _percent_text(count.most_hazardous_share)
     level = f"{100 * CONFIDENCE_OF_EACH_LOOK:g} % for each look"
     return (
-        f"{count.failed} of {drawn} hazardous: at most {percent} of the cells called without hazard are "
+        f"{count.hazardous} of {drawn} {hazardous}: at most {percent} of the cells called without hazard are "
         f"hazardous ({level})."
     )
 
@@ -230,10 +235,10 @@ def _survived_text(envelope: Envelope, duration_s: float | None) -> str:
         return magnitude_text(envelope, survived)
     if duration_s is not None and duration_s > envelope.durations_s[-1]:
         return "not tried"
-    smallest = envelope.cells[0][: envelope.columns_up_to(duration_s)]
-    if any(state.is_hazardous for state in smallest):
+    smallest, count = envelope.cells[0], envelope.columns_up_to(duration_s)
+    if any(state.is_hazardous for state in (smallest if duration_s is None else smallest[:count])):
         return "none" if envelope.plane.magnitudes else "no"
-    is_survived = not envelope.plane.magnitudes and all(state.is_without_hazard for state in smallest)
+    is_survived = not envelope.plane.magnitudes and all(s.is_without_hazard for s in smallest[:count])
     return "yes" if is_survived else "not decided"
 
 
@@ -243,7 +248,7 @@ def _short_validation(envelope: Envelope) -> str:
     count = count_validation(envelope, envelope.validation)
     if not count.drawn:
         return "nothing to draw"
-    text = f"{count.failed} of {count.driven}"
+    text = f"{count.hazardous} of {count.driven}"
     if not count.is_complete:
         return f"{text} (unfinished)"
     return f"{text} (all)" if count.is_census else f"{text} (≤ {_percent_text(count.most_hazardous_share)})"

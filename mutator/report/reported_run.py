@@ -17,6 +17,7 @@ from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN, Ex
 from mutator.report.explored_planes import ExploredPlanes
 from mutator.report.fault_path_page_data import RunFaultPaths
 from mutator.report.panel import Panel
+from mutator.report.search_findings import SearchFindings
 from mutator.report.source_lines_with_outcomes import SourceLines
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import Results
@@ -48,7 +49,7 @@ class ReportedRun:
     engine_summary: EngineSummary | None = None
     has_study_page: bool = False
     change: ChangeSinceRunBefore | None = None
-    explored: ExploredPlanes | None = None
+    explored: ExploredPlanes | SearchFindings | None = None
     run_fault_paths: RunFaultPaths | None = None
     source_lines: SourceLines | None = None
     faults: Mapping[str, Fault] = field(default_factory=dict)

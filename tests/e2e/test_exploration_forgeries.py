@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
@@ -22,7 +22,7 @@ from mutator.campaigns.plan_growth import BatchChain
 from mutator.campaigns.plan_tally import plan_digest
 from mutator.explore.envelope_files import ENVELOPES_FILE
 from mutator.explore.exploration_replay import replay_exploration
-from mutator.model import Experiment
+from mutator.model import AfterHazard, Experiment
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD
@@ -294,7 +294,18 @@ def a_boundary_pair(run: Path) -> None:
     edit_envelopes(run, edit)
 
 
+def the_exploration(run: Path) -> None:
+    edit_campaign(run, r"\nexplore: .*\n", "\n")
+
+
+def the_end_of_a_run(run: Path) -> None:
+    other = {AfterHazard.GO_ON: AfterHazard.STOP, AfterHazard.STOP: AfterHazard.GO_ON}
+    replace_in_batch(run, 1, 0, lambda e: replace(e, after_hazard=other[e.after_hazard]))
+
+
 FORGERIES = (
+    the_exploration,
+    the_end_of_a_run,
     a_moved_border,
     a_merged_batch,
     a_split_batch,
@@ -346,7 +357,65 @@ def test_a_forgery_with_redone_digests_is_found(
     forge(run)
     reseal(run)
     [difference, *_] = check_of(run, genuine[0]).differences
-    assert re.search(r"follow|'exploration, batch|no further batch", str(difference)), difference
+    texts = r"follow|'exploration, batch|no further batch|no exploration"
+    assert re.search(texts, str(difference)), difference
+
+
+def test_an_exploration_that_was_cut_off_is_a_prefix(
+    genuine: tuple[Workspace, Path], run: Path, reseal: Reseal
+) -> None:
+    """Fewer batches, or a batch without all its records, are no difference: it is said that a plane is
+    unfinished, and its envelope has what was driven.
+    """
+    workspace, manifest = genuine[0], genuine[0].manifest("toycar")
+    batches = batches_of(run)
+    write_batches(run, batches[:2])
+    keep_records(run, [experiment.id for batch in batches[:2] for experiment in batch])
+    reseal(run)
+    cut = replay_exploration(RunFolder(run), manifest)
+    assert cut.differences == () and cut.envelopes[0].run_count == sum(map(len, batches[:2]))
+    assert cut.note == "unfinished: 1 plane is not searched to the end"
+    keep_records(run, [experiment.id for experiment in batches[0]])
+    reseal(run, finished=False)
+    killed = replay_exploration(RunFolder(run), manifest)
+    assert killed.differences == () and killed.envelopes[0].run_count == len(batches[0])
+    assert check_of(run, workspace).differences == ()
+
+
+def keep_records(run: Path, names: list[str]) -> None:
+    for path in (run / "records").iterdir():
+        head, *lines = path.read_text().splitlines()
+        kept = [line for line in lines if json.loads(line)["experiment_id"] in names]
+        path.write_text("".join(f"{line}\n" for line in (head, *kept)))
+
+
+@pytest.mark.parametrize("strategy", ["planes", "random"])
+def test_a_search_is_replayed(
+    genuine: tuple[Workspace, Path], tmp_path: Path, reseal: Reseal, strategy: Literal["planes", "random"]
+) -> None:
+    """Its proposals follow from its records, but not a moved border; the page begins with the findings."""
+    workspace, run = genuine[0], tmp_path / "run"
+    found = mutator.search(
+        ["sensor/lane/shifted", "sensor/distance/longer"],
+        "A",
+        [0.5, 1.0],
+        run,
+        budget=24,
+        strategy=strategy,
+        longest_s=3.0,
+        campaign="small",
+        workspace=workspace,
+    )
+    assert check_of(run, workspace).differences == ()
+    report = mutator.load_run(run, workspace=workspace).report()
+    text = report.markdown.read_text()
+    assert f"The search has {len(found)} finding" in text and "no share of them" in text
+    page = report.page.read_text()
+    assert all(f'href="#e={finding.result.experiment_id}"' in page for finding in found)
+    first, second, *others = batches_of(run)
+    write_batches(run, [first[:-1], [first[-1], *second], *others])
+    reseal(run)
+    assert check_of(run, workspace).differences
 
 
 def test_a_worse_controller_has_a_smaller_envelope(

@@ -13,6 +13,7 @@ from mutator.report.panels import (
     families_panel,
     fault_paths_panel,
     figures_panel,
+    findings_panel,
     mutation_score_panel,
     provenance_panel,
     seeds_panel,
@@ -24,7 +25,10 @@ from mutator.report.reported_run import ReportedRun
 
 PanelBuilder = Callable[[ReportedRun], Panel | None]
 
-LEADING_PANELS: tuple[PanelBuilder, ...] = (envelopes_panel.build_envelopes_panel,)  # before all others
+LEADING_PANELS: tuple[PanelBuilder, ...] = (  # before all others
+    envelopes_panel.build_envelopes_panel,
+    findings_panel.build_findings_panel,
+)
 
 PANELS: tuple[PanelBuilder, ...] = (
     families_panel.build_families_panel,

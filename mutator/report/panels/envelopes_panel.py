@@ -59,7 +59,7 @@ _HTML_TEMPLATE = """\
 
 def build_envelopes_panel(run: ReportedRun) -> Panel | None:
     """Return the panel; None for a run without an exploration."""
-    return None if run.explored is None else panel_of_planes(run.explored)
+    return panel_of_planes(run.explored) if isinstance(run.explored, ExploredPlanes) else None
 
 
 def panel_of_planes(planes: ExploredPlanes) -> Panel:

@@ -46,3 +46,10 @@ def test_only_durations_that_can_be_observed_count() -> None:
     envelope = envelope_of(never, drive=drive)
     assert envelope.longest_tried_s <= 1.0 < envelope.durations_s[envelope.columns_up_to()]
     assert envelope.largest_survived() == 50.0
+
+
+def test_a_hazard_of_a_longer_fault_counts() -> None:
+    """Also if the drive leaves no time to observe what follows faults of that duration."""
+    drive = Drive(start_s=5.0, end_s=21.0, step_s=STEP_S)
+    envelope = envelope_of(lambda m, d: 2.0 if m >= 5 and d >= 9 else None, drive=drive)
+    assert (envelope.largest_survived() or 0) < 5.0 < (envelope.largest_survived(0.5) or 0)

@@ -40,13 +40,13 @@ def test_a_draw_bounds_the_share(frame: int, drawn: int, failed: int, most: floa
     """86 draws without a failure show 5 %, 436 show 1 %, each at 98.75 %; with failures, more is possible.
     Half of a small frame shows more than the same number of draws from a large one.
     """
-    count = ValidationCount(frame=frame, drawn=drawn, driven=drawn, failed=failed)
+    count = ValidationCount(frame=frame, drawn=drawn, driven=drawn, hazardous=failed)
     assert 0.5 * most < count.most_hazardous_share <= most
 
 
 def test_a_census_needs_no_bound() -> None:
     """Where all cells are drawn, the share is known."""
-    count = ValidationCount(frame=4, drawn=4, driven=4, failed=1)
+    count = ValidationCount(frame=4, drawn=4, driven=4, hazardous=1)
     assert count.is_census and count.most_hazardous_share == 0.25
 
 

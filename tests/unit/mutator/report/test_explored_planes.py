@@ -51,6 +51,13 @@ def test_the_sentence_fits_each_kind_of_plane(envelope: Envelope, text: str) -> 
     assert text in sentence(envelope)
 
 
+def test_an_unfinished_validation_says_so() -> None:
+    """A cell that was drawn but not driven shows nothing."""
+    whole = envelope_of(line)
+    text = describe_plane_validation(envelope_of(line, most_runs=whole.run_count - 3))
+    assert text == "Validation unfinished: 7 of 10 drawn cells driven, 0 of them hazardous."
+
+
 def test_the_worst_plane_comes_first() -> None:
     """Planes of one fault stay together; the fault with the worst plane comes first."""
     worse = envelope_of(lambda m, d: 1.0, replace(MADE_PLANE, scenario="B"))
