@@ -38,7 +38,7 @@ def main() -> int:
                 start_s,
                 out / "explored",
                 points=options.points,
-                campaign="quickstart",
+                campaign="survived",
                 workers=2,
             )
             for envelope in explored:
@@ -49,7 +49,7 @@ def main() -> int:
 def drive_all(envelope: mutator.Envelope, out: Path) -> list[list[CellState]]:
     """Drive every cell of an envelope's lattice; return the states by magnitude and duration."""
     lattice, plane = envelope.exploration.map.lattice, envelope.plane
-    with mutator.open_bench(None, out, campaign="quickstart", after_hazard="stop", workers=2) as bench:
+    with mutator.open_bench(None, out, campaign="survived", after_hazard="stop", workers=2) as bench:
         cells = [
             bench.build_experiment(
                 plane.spec,
