@@ -11,6 +11,7 @@ import mutator
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import counted
 from mutator.cli import shell_completion
+from mutator.cli.envelope_printing import print_envelopes
 from mutator.cli.plan_and_run_commands import WORKERS_DEFAULT_HELP
 from mutator.cli.shared_options import (
     Cluster,
@@ -141,7 +142,6 @@ def envelope(
     """
     from mutator.api.explorations import envelope as find_envelopes
     from mutator.cli.progress_display import campaign_progress
-    from mutator.explore.envelope_texts import describe_envelope, describe_validation, envelope_table
 
     terminal = Terminal(as_json, wide)
     with warnings.catch_warnings(), campaign_progress(terminal) as show_progress:
@@ -169,11 +169,7 @@ def envelope(
     if as_json:
         terminal.print_json([plane.as_json() for plane in envelopes])
     else:
-        for plane in envelopes:
-            terminal.print_text(f"{describe_envelope(plane)} ({describe_validation(plane)})")
-        table = envelope_table(envelopes)
-        terminal.print_text()
-        terminal.print_table(table.heads, table.rows, right_aligned=list(table.right_aligned))
+        print_envelopes(terminal, envelopes)
         _print_end(terminal, envelopes.summary, out)
     _exit_as(envelopes.summary)
 

@@ -14,6 +14,7 @@ import typer
 import mutator
 from mutator._common.cpu_cores import usable_cores
 from mutator.cli import shell_completion
+from mutator.cli.envelope_printing import print_envelopes
 from mutator.cli.github_step import GitHub, GitHubStep, showing_errors
 from mutator.cli.merge_report_clean_commands import print_outcome_counts
 from mutator.cli.plan_printing import print_plan, print_plan_as_json
@@ -282,6 +283,8 @@ def _print_results(terminal: Terminal, run: "Run", summary: "Summary") -> None:
         print_outcome_counts(terminal, run)
     if not summary.is_provisional and (note := run.drives_note()):
         terminal.print_text(note)
+    if envelopes := run.envelopes:
+        print_envelopes(terminal, envelopes)
     terminal.print_text(
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now; "
         f"checks, experiments and proof took {describe_duration(summary.elapsed_s)}"
