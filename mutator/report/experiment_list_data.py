@@ -61,7 +61,7 @@ MOST_EMBEDDED_STILL_BYTES = 1_000_000  # limit of the stills embedded in the pag
 _TRACE_DIGEST_DIGITS = 16  # enough to notice another trace; whole digests would be four times as long
 _MOST_BYTES_OF_FIRST_REPLAY = 500_000  # about 7 kB are usual; a larger series is read from its file
 MOST_LISTED_EXPERIMENTS = 50_000  # that the page lists, so that it opens quickly
-_MOST_LISTED_OF_EXPLORATION = 12_000  # these are less alike, and pictures need room, too
+_MOST_LISTED_OF_EXPLORATION = 8_000  # these are less alike, and pictures need room, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

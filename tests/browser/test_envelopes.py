@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 import mutator
+from mutator.report import experiment_list_data
+from mutator.report.reported_run import ReportedRun
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -77,3 +80,14 @@ def test_it_reads_well_on_every_screen(
     label = page.page.locator("svg.plane").first.get_attribute("aria-label")
     assert label and SPEC in label
     assert serious_faults(page.page) == []
+
+
+def test_a_cut_list_keeps_what_the_table_links(explored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of very many runs, the page lists the worst and those with links, so that each link opens its run."""
+    monkeypatch.setattr(experiment_list_data, "_MOST_LISTED_OF_EXPLORATION", 2)
+    run = ReportedRun.open(RunFolder.open(explored), Workspace.find(root=explored.parent / "toy"))
+    content = experiment_list_data.build_list_data(run)
+    assert run.explored and len(run.explored.linked_ids) > 2
+    assert content.truncation_note.startswith("The list has the 2 worst, and those with links above, of ")
+    listed = set(experiment_list_data._listed_results(run)["experiment_id"])
+    assert run.explored.linked_ids <= listed and len(listed) < len(run.results)
