@@ -11,7 +11,7 @@ from mutator._common.hashing import digest
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
-from mutator.audit.run_audit import AuditCheck, run_audit_checks
+from mutator.audit.run_audit import SOURCES_CHECK, AuditCheck, run_audit_checks
 from mutator.audit.run_digests_and_seal import Seals, seals_of, unsealed_facts
 from mutator.audit.run_repair import repair_run as put_aside
 from mutator.audit.seal_signatures import sign_seal as write_signature
@@ -125,7 +125,8 @@ def verify(
     opened_workspace = _open_workspace_if_any(workspace)
     checks = run_audit_checks(folder, opened_workspace)
     facts = _run_facts(folder)
-    checks += _exploration_checks(folder, opened_workspace, facts)
+    if not any(check.differences for check in checks if check.checked_parts == SOURCES_CHECK):
+        checks += _exploration_checks(folder, opened_workspace, facts)
     if rerun:
         checks.append(_rerun_check(folder, opened_workspace, rerun, facts))
     seals = _seals_if_undamaged(folder, checks)

@@ -38,6 +38,7 @@ from mutator.store.run_head import CAMPAIGN_FILE, HEAD
 from mutator.workspace import Workspace
 
 Problems = Iterator[MutatorError]
+SOURCES_CHECK = "sources that match those of the run"  # what reads the library needs it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +77,7 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
     """
     head = folder.head
     source_check = AuditCheck.from_problems(
-        "sources that match those of the run", len(head.sources), _source_problems(folder, workspace)
+        SOURCES_CHECK, len(head.sources), _source_problems(folder, workspace)
     )
     manifest = workspace.manifest(head.target) if workspace and not source_check.differences else None
     records, proven = load_stored_records(folder, "records"), load_stored_records(folder, "proof")
