@@ -158,11 +158,11 @@ class _ReplayedPlan:
         if self._difference is not None:
             return False
         new_ids = self._plan.ids[self._position : self._position + len(new_keys)]
-        ids = {**self._id_by_key, **dict(zip(new_keys, new_ids, strict=True))}
-        self.is_cut_off = any(self._plan.final_record(ids[self._key(proposal)]) is None for proposal in batch)
+        earlier_ids = [self._id_by_key[key] for key in map(self._key, batch) if key in self._id_by_key]
+        self.is_cut_off = any(self._plan.final_record(name) is None for name in (*new_ids, *earlier_ids))
         if self.is_cut_off:
             return False
-        self._id_by_key = ids
+        self._id_by_key |= zip(new_keys, new_ids, strict=True)
         return True
 
     def begin(self, number: int, batch: Sequence[Proposal]) -> None:
