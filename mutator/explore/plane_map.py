@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
+from mutator.errors import MutatorError
 from mutator.explore.cell_results import CellResult, CellState
 from mutator.explore.lattice import Cell, Lattice
 
@@ -55,15 +56,30 @@ class PlaneMap:
     _decided_by_line: dict[int, list[tuple[int, bool]]] = field(default_factory=dict)  # on demand
 
     def add(self, cell: Cell, result: CellResult) -> None:
+        """Take the result of a cell. MutatorError if it contradicts what follows from a shorter fault."""
         self.results[cell] = result
-        self._decided_by_line.pop(cell[0], None)
-        if result.inferred_from_s is None:
-            return
         line, _ = cell
-        durations = self.lattice.durations_s
-        first = next(j for j, duration in enumerate(durations) if duration >= result.inferred_from_s)
-        if line not in self.inferring or first < self.inferring[line][0]:
-            self.inferring[line] = first, result
+        self._decided_by_line.pop(line, None)
+        if result.inferred_from_s is not None:
+            durations = self.lattice.durations_s
+            first = next(j for j, duration in enumerate(durations) if duration >= result.inferred_from_s)
+            if line not in self.inferring or first < self.inferring[line][0]:
+                self.inferring[line] = first, result
+        self._check_causality(line)
+
+    def _check_causality(self, line: int) -> None:
+        if line not in self.inferring:
+            return
+        first, proof = self.inferring[line]
+        for duration in range(first, len(self.lattice.durations_s)):
+            result = self.results.get((line, duration))
+            if result and result.state is CellState.WITHOUT_HAZARD:
+                raise MutatorError(
+                    f"experiment {result.experiment_id} has no hazard, but the shorter fault of experiment "
+                    f"{proof.experiment_id} reached {proof.hazard} while it was active",
+                    expected="two runs that are the same up to this hazard",
+                    remedy="check that the target is deterministic: `mutator check --drive`",
+                )
 
     def state(self, cell: Cell) -> CellState | None:
         """Return what was driven or inferred; None if neither."""
