@@ -42,7 +42,8 @@ class FindingSearch:
     drives: Sequence[Drive]
     seed: int
     planes: list[PlaneMap] = field(init=False)
-    _proposed: list[Proposal] = field(default_factory=list)
+    _proposed: dict[Proposal, None] = field(default_factory=dict)  # in their order
+    _draws: int = 0  # of the strategy `random`, with those of cells that came before
     _begun: set[int] = field(default_factory=set)  # planes that were proposed, and those with a hazard
     _hazardous: set[int] = field(default_factory=set)
 
@@ -58,7 +59,7 @@ class FindingSearch:
         """Return the next batch; empty once the budget is spent or nothing is left to drive."""
         count = min(self.section.batch, self.section.budget - len(self._proposed))
         proposals = self._draw(count) if self.section.strategy == RANDOM else self._choose(count)
-        self._proposed += proposals
+        self._proposed |= dict.fromkeys(proposals)
         return proposals
 
     def note(self, proposal: Proposal, record: Record) -> None:
@@ -77,9 +78,15 @@ class FindingSearch:
         ]
 
     def _draw(self, count: int) -> list[Proposal]:
-        first = len(self._proposed)
-        drawn = (self._drawn_proposal(number) for number in range(first, first + count))
-        return [proposal for proposal in drawn if proposal not in self._proposed]
+        """Draw new proposals; fewer than `count` if few cells are left."""
+        drawn: list[Proposal] = []
+        cell_count = sum(plane.lattice.size for plane in self.planes)
+        while len(drawn) < count and len(self._proposed) + len(drawn) < cell_count:
+            proposal = self._drawn_proposal(self._draws)
+            self._draws += 1
+            if proposal not in self._proposed and proposal not in drawn:
+                drawn.append(proposal)
+        return drawn
 
     def _drawn_proposal(self, number: int) -> Proposal:
         generator = random_generator(self.seed, f"explore/find/{number}")
@@ -120,11 +127,11 @@ class FindingSearch:
 
     def _next_in_depth(self, chosen: Sequence[Proposal]) -> Proposal | None:
         """Return a smaller or shorter cell of a plane with a hazard, the one with the fewest runs first."""
-        proposed = {*self._proposed, *chosen}
         for number in sorted(self._hazardous, key=lambda number: (len(self.planes[number].results), number)):
             proposals = (Proposal(number, cell) for cell in smaller_cells(self.planes[number]))
-            if new := next((proposal for proposal in proposals if proposal not in proposed), None):
-                return new
+            new = (p for p in proposals if p not in self._proposed and p not in chosen)
+            if proposal := next(new, None):
+                return proposal
         return None
 
 

@@ -82,6 +82,19 @@ def test_no_cell_is_driven_twice() -> None:
     assert len(set(proposals)) == len(proposals) < 2_000
 
 
+def test_chance_spends_its_budget() -> None:
+    """Cells that are drawn again cost no run, and do not end the search before all cells were driven."""
+    cell_count = sum(len(plane.magnitudes) * len(plane.durations_s) for plane in PLANES)
+    _, batches = searched("random", budget=2_000)
+    assert sum(map(len, batches)) == 2_000 < cell_count
+    section = ExplorationSection(planes=PLANES[:1], goal="find", strategy="random", budget=1_000)
+    search = FindingSearch(section=section, drives=[Drive(start_s=0.0, end_s=60.0, step_s=STEP_S)], seed=1)
+    proposals = []
+    while batch := search.propose():
+        proposals += batch
+    assert len(set(proposals)) == len(proposals) == len(MAGNITUDES) * len(DURATIONS)
+
+
 def test_a_finding_is_the_smallest_fault_that_was_driven() -> None:
     """At the end of the search, a fault of half its magnitude and duration has no hazard."""
     search, _ = searched("planes", budget=2_000)
