@@ -21,6 +21,8 @@ def describe_envelope(envelope: Envelope) -> str:
     longest = f"{envelope.longest_tried_s:g} s"
     if failing is None:
         return f"{where}: no hazard, up to {_magnitude_text(envelope, -1)} for {longest}"
+    if envelope.magnitudes == (None,):
+        return f"{where}: {_durations_text(envelope)}"
     survived = envelope.largest_survived()
     survives = (
         f"{magnitude_text(envelope, survived)} is survived for every duration up to {longest}, "
@@ -29,6 +31,13 @@ def describe_envelope(envelope: Envelope) -> str:
     )
     duration = envelope.shortest_hazardous_s(failing)
     return f"{where}: {survives}{_magnitude_text(envelope, failing)} for {duration:g} s is not"
+
+
+def _durations_text(envelope: Envelope) -> str:
+    """Return which durations of a fault without a value are survived, up to the first that is not."""
+    survived, hazardous = envelope.longest_survived_s(0), envelope.shortest_hazardous_s(0)
+    not_survived = f"not survived for {hazardous:g} s"
+    return not_survived if survived is None else f"survived for up to {survived:g} s, {not_survived}"
 
 
 def first_failing_line(envelope: Envelope) -> int | None:
