@@ -103,6 +103,7 @@ def test_each_parameter_can_be_an_axis(page: "Page") -> None:
     page.page.select_option("#map-x", "road")
     page.page.select_option("#map-y", "hazards")
     page.page.click(".map-of-family summary")
+    page.page.wait_for_selector(".map-of-family th")  # the browser opens the table after the click
     heads = page.texts(".map-of-family th")
     assert heads[:2] == ["road", "experiments with a hazard [%]"]
     rows = page.texts(".map-of-family tbody tr")
