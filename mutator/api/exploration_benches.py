@@ -44,11 +44,13 @@ def opened_exploration(
     """Open the bench of an exploration, and finish it at the end of the block."""
     check_whole_number("workers", workers, least=1)
     check_engine_is_offered(engine)
+    values = {name: value for name, value in values.items() if name != "include"}
+    values |= {"after_hazard": after_hazard_of(selected_target).value, "explore": asdict(section)}
     with (
         opened_bench(
             selected_target.workspace,
             out,
-            {**values, "after_hazard": after_hazard_of(selected_target).value, "explore": asdict(section)},
+            values,
             workers=workers,
             engine=engine,
             reuse=reuse,

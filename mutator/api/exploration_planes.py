@@ -14,6 +14,7 @@ from mutator.explore.lattice import durations_between
 from mutator.explore.plane_building import magnitudes_by_sign
 from mutator.families.family import argument_of
 from mutator.faults.fault_specs import Variant
+from mutator.limits import MOST_LIMIT_OR_TIME
 
 
 def chosen_planes(
@@ -33,25 +34,26 @@ def chosen_planes(
     """
     check_whole_number("points", min(magnitude_count, duration_count), least=1)
     check_whole_number("seed", seed)
-    check_number("longest_s", longest_s, least=0.0)
     workspace, manifest = selected_target.workspace, selected_target.manifest
+    check_number("longest_s", longest_s, least=manifest.step_s)
+    check_number("longest_s", -longest_s, least=-MOST_LIMIT_OR_TIME)
     durations = durations_between(manifest.step_s, longest_s, duration_count, manifest.step_s)
+    start_texts = list(dict.fromkeys(map(_start_text, starts)))
+    scenarios = list(dict.fromkeys(scenarios))
     triggers = [
-        context_or_parsed_trigger(
-            workspace, str(start), manifest.armed_after_s, manifest.observation.variables
-        )
-        for start in starts
+        context_or_parsed_trigger(workspace, start, manifest.armed_after_s, manifest.observation.variables)
+        for start in start_texts
     ]
     for spec, variant in _chosen_variants(selected_target, names):
         unit = UNITS[variant.draw.unit].symbol if variant.draw and variant.draw.unit else ""
-        for magnitudes in magnitudes_by_sign(variant, magnitude_count):
+        for magnitudes in _magnitudes(spec, variant, magnitude_count):
             for scenario in scenarios:
                 concrete = concrete_scenario_of(workspace, scenario)
-                for start, trigger in zip(starts, triggers, strict=True):
+                for start, trigger in zip(start_texts, triggers, strict=True):
                     yield ExploredPlane(
                         spec=f"{spec}/{variant.name}",
                         scenario=argument_of(concrete) if concrete else str(scenario),
-                        start=str(start),
+                        start=start,
                         condition=trigger.condition,
                         armed_after_s=trigger.armed_after_s,
                         magnitudes=magnitudes,
@@ -59,6 +61,29 @@ def chosen_planes(
                         durations_s=list(durations),
                         seed=seed,
                     )
+
+
+def _magnitudes(spec: str, variant: Variant, count: int) -> list[list[float]]:
+    try:
+        return list(magnitudes_by_sign(variant, count))
+    except ValueError as error:
+        raise MutatorError(
+            f"{spec}/{variant.name}: {error}",
+            argument="specs",
+            expected="values that are sizes of an error, from small to large",
+            remedy="choose other faults, or run its values with a campaign",
+        ) from None
+
+
+def _start_text(start: TriggerLike) -> str:
+    """Return a time as `1`, not `1.0`, or a context's name; MutatorError for a time before the drive."""
+    try:
+        time_s = float(str(start))
+    except ValueError:
+        return str(start)
+    if not 0 <= time_s <= MOST_LIMIT_OR_TIME:
+        raise MutatorError(f"{start}", argument="starts", expected="times in s from 0 on, or contexts")
+    return f"{time_s:.9g}"
 
 
 def _chosen_variants(selected_target: SelectedTarget, names: Sequence[str]) -> Iterator[tuple[str, Variant]]:

@@ -44,6 +44,7 @@ class Envelopes(Sequence[RunEnvelope]):
     run: Path  #: the run folder
     envelopes: tuple[RunEnvelope, ...]  #: an envelope for each fault, scenario and start that was begun
     summary: Summary | None  #: the summary of the bench; None if nothing was planned
+    note: str = ""  #: what is unfinished; empty if nothing is
 
     def __len__(self) -> int:
         return len(self.envelopes)
@@ -134,7 +135,12 @@ def envelope(
             bench, section, selected_target, values["reading"], within_budget(budget_s)
         )
     warn_of_end(bench.summary)
-    return Envelopes(run=Path(out), envelopes=envelopes_of_replay(explored), summary=bench.summary)
+    return Envelopes(
+        run=Path(out),
+        envelopes=envelopes_of_replay(explored),
+        summary=bench.summary,
+        note=explored.note,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -286,6 +286,7 @@ class CampaignModel(StrictModel, title="The file"):
             "setting": any(self.setting.values()),
             "methods": self.methods != [Method.GUIDED],
             "seeds": self.seeds,
+            "include": self.include,
         }
         for key, value in others.items():
             if value:

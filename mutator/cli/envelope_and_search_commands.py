@@ -170,6 +170,8 @@ def envelope(
         terminal.print_json([plane.as_json() for plane in envelopes])
     else:
         print_envelopes(terminal, envelopes)
+        if envelopes.note:
+            terminal.print_note(envelopes.note)
         _print_end(terminal, envelopes.summary, out)
     _exit_as(envelopes.summary)
 

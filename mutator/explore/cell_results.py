@@ -7,8 +7,6 @@ from enum import StrEnum
 from mutator.model import Outcome, Record, Status
 from mutator.targets.hazard_and_metric_definitions import MARGIN_PREFIX
 
-_RUNS_THAT_EQUAL_GOLDEN = (Outcome.NOT_ACTIVATED, Outcome.MASKED)
-
 
 class CellState(StrEnum):
     """What is said of a cell."""
@@ -48,6 +46,7 @@ class CellResult:
       after the end of the fault, which may then have caused it
     * `margins`: the smallest distance from each hazard that has a margin, by metric
     * `reason`: why the cell is not decided
+    * `is_activated`: whether the injected code ran while the fault was active
     """
 
     state: CellState
@@ -57,13 +56,13 @@ class CellResult:
     inferred_from_s: float | None = None
     margins: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
+    is_activated: bool = True
 
 
 def judge_cell(record: Record, duration_s: float, drive: Drive, observe_s: float) -> CellResult:
     """Judge the run of a fault that began at `drive.start_s` and lasted `duration_s`.
 
-    Without a hazard, the drive must have gone on for `observe_s` after the fault, unless the run never left
-    the golden run.
+    Without a hazard, the drive must have gone on for `observe_s` after the fault.
     """
     margins = {name: value for name, value in record.metrics if name.startswith(MARGIN_PREFIX)}
     name = record.experiment_id
@@ -74,8 +73,10 @@ def judge_cell(record: Record, duration_s: float, drive: Drive, observe_s: float
         hazard, time = record.hazards[0]
         return _hazardous_cell(name, hazard, time - drive.start_s, duration_s, drive.step_s, margins)
     observed_s = drive.end_s - drive.start_s - duration_s
-    if record.outcome in _RUNS_THAT_EQUAL_GOLDEN or observed_s >= observe_s - drive.step_s / 2:
-        return CellResult(state=CellState.WITHOUT_HAZARD, experiment_id=name, margins=margins)
+    if observed_s >= observe_s - drive.step_s / 2:
+        is_activated = record.outcome is not Outcome.NOT_ACTIVATED
+        state = CellState.WITHOUT_HAZARD
+        return CellResult(state=state, experiment_id=name, margins=margins, is_activated=is_activated)
     return CellResult(
         state=CellState.NOT_DECIDED,
         experiment_id=name,

@@ -66,6 +66,11 @@ class Envelope:
         return self.exploration.cells()
 
     @property
+    def was_active(self) -> bool:
+        """Whether the fault was active in any run."""
+        return any(result.is_activated for result in self.exploration.map.results.values())
+
+    @property
     def run_count(self) -> int:
         """The number of cells that were driven."""
         return len(self.exploration.map.results)

@@ -1,5 +1,6 @@
 """Envelopes and findings in words and as tables."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from mutator._common.message_text import counted
@@ -19,8 +20,11 @@ def describe_envelope(envelope: Envelope) -> str:
     where = f"{plane.spec} in {plane.scenario} from {start_text(envelope)}"
     failing = first_failing_line(envelope)
     longest = f"{envelope.longest_tried_s:g} s"
+    if not envelope.was_active:
+        return f"{where}: the fault was never active, so nothing can be said"
     if failing is None:
-        return f"{where}: no hazard, up to {_magnitude_text(envelope, -1)} for {longest}"
+        largest = f"up to {_magnitude_text(envelope, -1)} for {longest}"
+        return f"{where}: {_undecided_text(envelope)}no hazard found, {largest}"
     if envelope.magnitudes == (None,):
         return f"{where}: {_durations_text(envelope)}"
     survived = envelope.largest_survived()
@@ -31,6 +35,19 @@ def describe_envelope(envelope: Envelope) -> str:
     )
     duration = envelope.shortest_hazardous_s(failing)
     return f"{where}: {survives}{_magnitude_text(envelope, failing)} for {duration:g} s is not"
+
+
+def _undecided_text(envelope: Envelope) -> str:
+    """Return how many cells that leave time to observe are not decided, and why; empty if all are."""
+    decidable = range(envelope.exploration.decidable)
+    count = sum(not line[j].is_without_hazard for line in envelope.cells for j in decidable)
+    reasons = Counter(
+        result.reason
+        for (_, j), result in envelope.exploration.map.results.items()
+        if result.reason and j in decidable
+    )
+    why = f" ({reasons.most_common(1)[0][0]})" if reasons else ""
+    return f"{count:,} of {len(envelope.cells) * len(decidable):,} cells not decided{why}; " if count else ""
 
 
 def _durations_text(envelope: Envelope) -> str:
@@ -77,6 +94,11 @@ def describe_validation(envelope: Envelope) -> str:
         return f"{runs}; not validated"
     if not validation.drawn:
         return f"{runs}; no other cell is called without hazard"
+    if envelope.exploration.is_search_cut_off:
+        runs += "; the search ended by its limit"
+    driven = sum(cell in envelope.exploration.map.results for cell in validation.drawn)
+    if driven < len(validation.drawn):
+        return f"{runs}; the validation is unfinished: {driven} of {len(validation.drawn)} drawn cells driven"
     hazardous = len(envelope.exploration.failures(validation))
     return f"{runs}; {hazardous} of {len(validation.drawn)} drawn cells hazardous"
 

@@ -212,7 +212,7 @@ class _ReplayedPlan:
         return (
             plane.spec,
             plane.magnitudes[line] if plane.magnitudes else None,
-            plane.scenario,
+            _scenario_key(plane.scenario),
             self._exploration.drives[proposal.plane].start_s,
             plane.durations_s[duration],
             plane.seed,
@@ -226,11 +226,17 @@ def _key_of_experiment(experiment: Experiment, after_hazard: AfterHazard) -> _Ce
     return (
         experiment.fault.spec,
         experiment.fault.value,
-        argument_of(experiment.concrete) if experiment.concrete else experiment.scenario,
+        _scenario_key(argument_of(experiment.concrete) if experiment.concrete else experiment.scenario),
         trigger_time_s(trigger) if is_from_time_on else None,
         trigger.hold_s,
         experiment.seed,
     )
+
+
+def _scenario_key(scenario: str) -> str:
+    """Return a scenario's name, or family and values in one order: a plan sorts them by name."""
+    family, _, values = scenario.partition(":")
+    return f"{family}:{','.join(sorted(values.split(',')))}" if values else scenario
 
 
 def _cell_text(key: _CellKey) -> str:
@@ -245,7 +251,7 @@ def _drives_of_planes(
     drives = [_NO_DRIVE] * len(section.planes)
     numbers_by_golden: dict[GoldenRun, list[int]] = {}
     for number, plane in enumerate(section.planes):
-        golden = plan.golden_by_key.get((plane.spec, plane.scenario, plane.seed))
+        golden = plan.golden_by_key.get((plane.spec, _scenario_key(plane.scenario), plane.seed))
         if golden is not None:
             numbers_by_golden.setdefault(golden, []).append(number)
     for golden, numbers in numbers_by_golden.items():  # one golden run at a time in memory

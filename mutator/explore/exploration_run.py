@@ -11,6 +11,7 @@ from mutator.explore.exploration import BatchLoop, BatchProposer, Proposal, reas
 from mutator.explore.golden_drives import drive_of, load_observed_values
 from mutator.model import Experiment, Record, Status
 from mutator.store.golden_runs import GoldenRun
+from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 
 
@@ -25,13 +26,17 @@ class BuildExperiment(Protocol):
 def run_exploration(
     bench: Bench, proposer: BatchProposer, build: BuildExperiment, may_begin: Callable[[], bool]
 ) -> None:
-    """Run an exploration, or go on with it, until nothing is proposed or `may_begin` says no.
+    """Run an exploration, or go on with it, until nothing is proposed or `may_begin` says no. It is not asked
+    for batches that the run folder answers.
 
     MutatorError if the harness failed in an experiment.
     """
     run = _BenchRun(bench, proposer, build)
     BatchLoop(
-        exploration=proposer, begin=run.begin, finish=run.finish, may_begin=lambda batch: may_begin()
+        exploration=proposer,
+        begin=run.begin,
+        finish=run.finish,
+        may_begin=lambda batch: run.is_answered(batch) or may_begin(),
     ).run()
 
 
@@ -60,6 +65,15 @@ class _BenchRun:
         self._bench, self._proposer, self._build = bench, proposer, build
         self._experiment_ids: dict[Proposal, str] = {}
         self._records: dict[str, Record] = {}
+        folder = RunFolder(bench.path)
+        stored = folder.records().values() if RunFolder.exists(bench.path) else ()
+        self._stored_ids = {r.experiment_id for r in stored if r.status is not Status.HARNESS_ERROR}
+
+    def is_answered(self, batch: Sequence[Proposal]) -> bool:
+        """Whether all experiments of a batch had their records when the bench was opened."""
+        return bool(self._stored_ids) and all(
+            self._build_experiment(proposal).id in self._stored_ids for proposal in batch
+        )
 
     def begin(self, number: int, batch: Sequence[Proposal]) -> None:
         experiments = [self._build_experiment(proposal) for proposal in batch]

@@ -12,16 +12,27 @@ def magnitudes_by_sign(variant: Variant, points: int) -> Iterator[list[float]]:
     """Yield the magnitudes of a variant, by size: its positive ones, then its negative ones.
 
     A variant that lists its values has these. Others have `points` values at equal distances of their
-    logarithm, up to the largest one that the spec declares. Without any value: one empty list.
+    logarithm, up to the largest one that the spec declares. Without any value: one empty list. ValueError for
+    listed values that are no sizes: not ascending, or with 0.
     """
     if variant.draw is None:
         yield []
         return
+    if variant.draw.kind == "list":
+        yield from _listed_by_sign(list(dict.fromkeys(variant.draw.values)))
+        return
     low, high = variant.draw.least_and_greatest
     for largest, sign in ((high, 1), (-low, -1)):
-        if largest <= 0:
-            continue
-        if variant.draw.kind == "list":
-            yield sorted((value for value in variant.draw.values if value * sign > 0), key=abs)
-        else:
+        if largest > 0:
             yield [sign * value for value in magnitudes_between(largest * _SMALLEST_SHARE, largest, points)]
+
+
+def _listed_by_sign(values: list[float]) -> Iterator[list[float]]:
+    for sign in (1, -1):
+        sizes = [value for value in values if value * sign > 0]
+        if sizes != sorted(sizes, key=abs):
+            raise ValueError(f"listed values that do not grow: {', '.join(f'{value:g}' for value in values)}")
+        if sizes:
+            yield sizes
+    if 0 in values:
+        raise ValueError("0 among the listed values")

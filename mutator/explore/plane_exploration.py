@@ -64,6 +64,11 @@ class PlaneExploration:
         is_last = len(self.validations) == MOST_VALIDATIONS or not self.failures(validation)
         return is_last and not self._not_proposed(validation.drawn)
 
+    @property
+    def is_search_cut_off(self) -> bool:
+        """Whether the search ended by its limit of runs, with lines that it did not close."""
+        return not self._is_searching and not self._search().is_closed
+
     def cells(self) -> list[Line]:
         """Return the state of every cell, by magnitude and duration."""
         return self.map.cells(self._search().closed_lines())

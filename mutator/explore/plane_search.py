@@ -34,6 +34,11 @@ class PlaneSearch:
         lines = self._lines()
         return sorted(line for line, guess in lines.items() if not self._next_in_line(line, guess))
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the search of every line is over."""
+        return not any(self._next_in_line(line, guess) for line, guess in self._lines().items())
+
     def proposals(self) -> list[Cell]:
         """Return cells to drive, the most telling ones first; empty once the search is over."""
         lines = self._lines()

@@ -436,7 +436,7 @@ def test_a_worse_controller_has_a_smaller_envelope(
     ]
     comparison = mutator.compare(*runs)
     [finding] = comparison.findings(["smaller-envelope"])
-    assert "sensor/lane/shifted in A from 1.0 s" in finding.description
+    assert "sensor/lane/shifted in A from 1 s" in finding.description
     record = runs[1].experiment(finding.experiment_id).record
     assert record and record.hazards
     assert comparison.tables["envelopes"]["became hazardous"].tolist() > [0]

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 import mutator
 from mutator.cli.app import app
 from mutator.explore.cell_results import CellState
+from mutator.explore.envelope_texts import describe_envelope
 from mutator.store.records import load_records
 from mutator.workspace import Workspace
 
@@ -132,6 +133,60 @@ def test_a_search_names_what_it_found(toycar: Workspace, tmp_path: Path) -> None
     assert len(run.records) == 14 and run.verify().differences == ()
 
 
+@pytest.mark.usefixtures("kept_checks")
+def test_a_budget_that_is_spent_spoils_no_finished_exploration(toycar: Workspace, tmp_path: Path) -> None:
+    """What the folder answers costs nothing: the same envelopes, file and seal."""
+    options = {"points": 4, "longest_s": 3.0, "observe_s": 0.5, "validation": 3, "campaign": "small"}
+    first = mutator.envelope(SPEC, "A", 1, tmp_path / "run", workspace=toycar, **options)
+    stored = (tmp_path / "run" / "envelopes.json").read_bytes()
+    again = mutator.envelope(SPEC, "A", 1, tmp_path / "run", workspace=toycar, budget_s=0, **options)
+    assert again[0].as_json() == first[0].as_json() and not again.note
+    assert (tmp_path / "run" / "envelopes.json").read_bytes() == stored
+    nothing = mutator.envelope(SPEC, "A", 2, tmp_path / "new", workspace=toycar, budget_s=0, **options)
+    assert not nothing.envelopes and nothing.note
+
+
+@pytest.mark.usefixtures("kept_checks")
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ("[0.0, 2.5]", "0 among the listed values"),
+        ("[2.5, 1.0]", "listed values that do not grow: 2.5, 1"),
+    ],
+)
+def test_listed_values_that_are_no_sizes_are_refused(
+    toycar: Workspace, tmp_path: Path, values: str, text: str
+) -> None:
+    """Nothing is dropped or reordered in silence."""
+    path = toycar.library / "faults" / "sensor" / "lane.yaml"
+    drawn = "reals_from: {first: [0.0, 0.1], step: 0.8, last: [2.4, 2.5]}\n        decimals: 2"
+    assert drawn in path.read_text()
+    path.write_text(path.read_text().replace(drawn, f"values: {values}"))
+    with pytest.raises(mutator.MutatorError, match=text):
+        mutator.envelope(SPEC, "A", 1, tmp_path / "run", workspace=toycar)
+
+
+@pytest.mark.usefixtures("kept_checks")
+def test_a_fault_that_is_never_active_is_not_called_survived(toycar: Workspace, tmp_path: Path) -> None:
+    """And equal starts and scenarios are one plane."""
+    path = toycar.library / "faults" / "sensor" / "lane.yaml"
+    path.write_text(
+        path.read_text().replace("function: Sensor.sense, after", "function: Sensor.never, after")
+    )
+    source = toycar.library.parent / "tree" / "toycar" / "sensing.py"
+    source.write_text(
+        source.read_text()
+        + "\n\ndef _add_never():\n    def never(self):\n        offset = 0\n        return offset\n"
+    )
+    path.write_text(path.read_text().replace("Sensor.never", "_add_never.never"))
+    explored = mutator.envelope(
+        SPEC, ["A", "A"], [1, 1.0], tmp_path / "run", points=3, longest_s=1.0, observe_s=0.5, workspace=toycar
+    )
+    [envelope] = explored
+    assert envelope.plane.start == "1"
+    assert "never active" in describe_envelope(envelope)
+
+
 _CAMPAIGN = """
 schema: campaign/1
 name: exploring
@@ -165,6 +220,9 @@ def test_a_campaign_explores(toycar: Workspace, tmp_path: Path) -> None:
     [
         ("seed: 3", "seed: 3\ntriggers: [always]", "no `triggers` with `explore`"),
         ("seed: 3", "seeds: {from: 1, to: 2}", "no `seeds` with `explore`"),
+        ("seed: 3", "seed: 3\ninclude: hazard_without_fault", "no `include` with `explore`"),
+        ("starts: [1]", "starts: [-1]", "times in s from 0 on"),
+        ("longest_s: 3", "longest_s: 0.01", "longest_s"),
         ("spec: sensor/lane/*", "spec: sensor/lane/*, values: 3", "without `values`, with `explore`"),
         ("starts: [1]", "starts: []", "starts"),
     ],

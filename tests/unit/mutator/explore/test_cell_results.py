@@ -33,13 +33,21 @@ def record(
     [
         (Outcome.SDC, 15.0, CellState.WITHOUT_HAZARD),
         (Outcome.SDC, 15.01, CellState.NOT_DECIDED),  # 14.99 s to observe
-        (Outcome.MASKED, 20.0, CellState.WITHOUT_HAZARD),  # it equals the golden run, which goes on
-        (Outcome.NOT_ACTIVATED, 20.0, CellState.WITHOUT_HAZARD),
+        (Outcome.MASKED, 15.0, CellState.WITHOUT_HAZARD),
+        (Outcome.MASKED, 20.0, CellState.NOT_DECIDED),  # what is latent may act later
+        (Outcome.NOT_ACTIVATED, 15.0, CellState.WITHOUT_HAZARD),
+        (Outcome.NOT_ACTIVATED, 20.0, CellState.NOT_DECIDED),
         (Outcome.NOT_JUDGED, 1.0, CellState.NOT_DECIDED),
     ],
 )
 def test_without_a_hazard_the_drive_must_go_on(outcome: Outcome, duration_s: float, state: CellState) -> None:
     assert judge_cell(record(outcome), duration_s, DRIVE, OBSERVE_S).state is state
+
+
+def test_a_fault_that_was_never_active_is_told() -> None:
+    """So that nobody calls it survived."""
+    assert not judge_cell(record(Outcome.NOT_ACTIVATED), 1.0, DRIVE, OBSERVE_S).is_activated
+    assert judge_cell(record(Outcome.MASKED), 1.0, DRIVE, OBSERVE_S).is_activated
 
 
 def test_a_hazard_during_the_fault_is_that_of_longer_faults() -> None:
