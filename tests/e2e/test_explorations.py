@@ -170,15 +170,10 @@ def test_listed_values_that_are_no_sizes_are_refused(
 def test_a_fault_that_is_never_active_is_not_called_survived(toycar: Workspace, tmp_path: Path) -> None:
     """And equal starts and scenarios are one plane."""
     path = toycar.library / "faults" / "sensor" / "lane.yaml"
-    path.write_text(
-        path.read_text().replace("function: Sensor.sense, after", "function: Sensor.never, after")
-    )
+    path.write_text(path.read_text().replace("function: Sensor.sense", "function: _add_never.never"))
     source = toycar.library.parent / "tree" / "toycar" / "sensing.py"
-    source.write_text(
-        source.read_text()
-        + "\n\ndef _add_never():\n    def never(self):\n        offset = 0\n        return offset\n"
-    )
-    path.write_text(path.read_text().replace("Sensor.never", "_add_never.never"))
+    never = "def _add_never():\n    def never(self):\n        offset = 0\n        return offset\n"
+    source.write_text(f"{source.read_text()}\n\n{never}")
     explored = mutator.envelope(
         SPEC, ["A", "A"], [1, 1.0], tmp_path / "run", points=3, longest_s=1.0, observe_s=0.5, workspace=toycar
     )
