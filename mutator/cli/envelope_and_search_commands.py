@@ -245,6 +245,11 @@ def search(
         terminal.print_text(
             f"{counted(len(findings), 'finding')} in {counted(len(findings.planes), 'plane')}"
         )
+        if findings.summary and findings.summary.planned < budget:
+            terminal.print_note(
+                f"the search ended after {findings.summary.planned:,} of {budget:,} runs: it knows no cell "
+                "that it would drive next"
+            )
         terminal.print_table(
             table.heads, table.rows, right_aligned=list(table.right_aligned), last_is_whole=True
         )
