@@ -7,12 +7,15 @@ from mutator._common.message_text import counted
 from mutator.comparison.paired_rate_and_time_sheets import RunDisplayNames
 from mutator.explore.cell_results import CellResult, CellState
 from mutator.explore.envelope import Envelope
+from mutator.explore.envelope_failures import nearest_hazardous_result, nearest_undecided_result
 from mutator.explore.envelope_texts import magnitude_text, name_of_plane
+from mutator.explore.lattice import Cell
 from mutator.statistics.statistics_sheet import Sheet
 
 EnvelopesOfEachRun = tuple[Sequence[Envelope], Sequence[Envelope]]
 _PlaneKey = tuple[str, str, str, bool, int]  # spec, scenario, start, sign, seed
 _MOST_NAMED_PLANES = 5
+_COMPARED = ("magnitudes", "durations in s", "starts in s", "observation times in s")
 _CellValues = tuple[float | None, float]  # magnitude, duration
 
 
@@ -20,8 +23,10 @@ _CellValues = tuple[float | None, float]  # magnitude, duration
 class EnvelopeChange:
     """A plane of two runs. `decided` is the number of cells of which both runs say what follows.
 
-    `proof` is the run of the smallest, shortest fault that the second run drove to a hazard, or inferred,
-    where the first run calls it without hazard; None if there is none.
+    `became_undecided` counts cells that the first run calls without hazard, and of which the second says
+    nothing, although their faults leave time to observe in the first. `evidence` is a run of the second: for
+    the smallest, shortest fault that became hazardous the run that proves it, or the nearest hazardous one if
+    none does; otherwise the run without a result that is nearest to what became undecided; None without any.
     """
 
     a: Envelope
@@ -29,18 +34,28 @@ class EnvelopeChange:
     decided: int
     became_hazardous: int
     became_safe: int
-    proof: CellResult | None
+    became_undecided: int
+    evidence: CellResult | None
 
     @property
     def is_smaller(self) -> bool:
-        """Whether a run shows that something that was survived no longer is."""
-        return self.proof is not None
+        """Whether the second run no longer calls something without hazard, and a run shows why."""
+        return self.evidence is not None
+
+    @property
+    def mismatch(self) -> str:
+        """Why the envelopes cannot be compared cell by cell; empty if they can."""
+        for name, before, after in zip(_COMPARED, _compared(self.a), _compared(self.b), strict=True):
+            if before != after:
+                values = f"{_range_text(before)} and {_range_text(after)}"
+                return f"{name_of_plane(self.b)}: {name} differ ({values})"
+        return ""
 
     @property
     def text(self) -> str:
         return (
             f"{name_of_plane(self.b)}: {counted(self.became_hazardous, 'cell')} of {self.decided} became "
-            f"hazardous, {self.became_safe} no longer are"
+            f"hazardous, {self.became_safe} no longer are, {self.became_undecided} no longer decided"
         )
 
 
@@ -77,7 +92,7 @@ def describe_envelope_changes(changes: Sequence[EnvelopeChange]) -> str:
 
 def envelopes_sheet(changes: Sequence[EnvelopeChange], names: RunDisplayNames) -> Sheet:
     heads = (
-        *("plane", "cells decided in both", "became hazardous", "no longer hazardous"),
+        *("plane", "cells decided in both", "became hazardous", "no longer hazardous", "no longer decided"),
         *(f"survived for every duration, {name}" for name in (names.a, names.b)),
         "smaller",
     )
@@ -87,6 +102,7 @@ def envelopes_sheet(changes: Sequence[EnvelopeChange], names: RunDisplayNames) -
             change.decided,
             change.became_hazardous,
             change.became_safe,
+            change.became_undecided,
             _largest_survived_text(change.a),
             _largest_survived_text(change.b),
             "yes" if change.is_smaller else "no",
@@ -95,7 +111,8 @@ def envelopes_sheet(changes: Sequence[EnvelopeChange], names: RunDisplayNames) -
     )
     note = (
         "Cells of which both runs say whether a hazard follows, with those between runs. An envelope is "
-        f"smaller if {names.b} drove a fault to a hazard, or inferred it, that {names.a} calls survived."
+        f"smaller if a cell that {names.a} calls without hazard, driven or between runs, is hazardous in "
+        f"{names.b}, or not decided because runs there have no result."
     )
     return Sheet(name="envelopes", title="What is survived", note=note, heads=heads, lines=lines)
 
@@ -107,21 +124,49 @@ def _key(envelope: Envelope) -> _PlaneKey:
 
 
 def _change(a: Envelope, b: Envelope) -> EnvelopeChange:
-    before = _state_by_values(a)
-    decided = became_hazardous = became_safe = 0
-    proof: CellResult | None = None
+    before, observed = _state_by_values(a), set(a.durations_s[: a.columns_up_to()])
+    decided = became_safe = 0
+    became_hazardous: list[Cell] = []
+    became_undecided: list[Cell] = []
     for i, j, values in _cells(b):
         was, now = before.get(values, CellState.UNKNOWN), b.cells[i][j]
-        if not all(state.is_hazardous or state.is_without_hazard for state in (was, now)):
-            continue
-        decided += 1
-        became_safe += was.is_hazardous and now.is_without_hazard
-        if was.is_without_hazard and now.is_hazardous:
-            became_hazardous += 1
-            proof = proof or b.exploration.map.proof_of((i, j))
+        if not (now.is_hazardous or now.is_without_hazard):
+            if was.is_without_hazard and values[1] in observed:
+                became_undecided.append((i, j))
+        elif was.is_hazardous or was.is_without_hazard:
+            decided += 1
+            became_safe += was.is_hazardous and now.is_without_hazard
+            if was.is_without_hazard and now.is_hazardous:
+                became_hazardous.append((i, j))
     return EnvelopeChange(
-        a=a, b=b, decided=decided, became_hazardous=became_hazardous, became_safe=became_safe, proof=proof
+        a=a,
+        b=b,
+        decided=decided,
+        became_hazardous=len(became_hazardous),
+        became_safe=became_safe,
+        became_undecided=len(became_undecided),
+        evidence=_evidence(b, became_hazardous, became_undecided),
     )
+
+
+def _evidence(b: Envelope, hazardous: Sequence[Cell], undecided: Sequence[Cell]) -> CellResult | None:
+    if hazardous:
+        proofs = (b.exploration.map.proof_of(cell) for cell in hazardous)
+        return next(filter(None, proofs), None) or nearest_hazardous_result(b, hazardous[0])
+    return nearest_undecided_result(b, undecided[0]) if undecided else None
+
+
+def _compared(envelope: Envelope) -> tuple[tuple[float | None, ...], ...]:
+    """Return what two envelopes must have in common, in the order of `_COMPARED`."""
+    observe_s = envelope.exploration.section.observe_s
+    return envelope.magnitudes, envelope.durations_s, (envelope.drive.start_s,), (observe_s,)
+
+
+def _range_text(values: Sequence[float | None]) -> str:
+    first, last = values[0], values[-1]
+    if first is None or last is None:
+        return "none"
+    return f"{first:g}" if len(values) == 1 else f"{len(values)} values from {first:g} to {last:g}"
 
 
 def _state_by_values(envelope: Envelope) -> Mapping[_CellValues, CellState]:

@@ -75,7 +75,7 @@ class Gate(StrEnum):
     HARNESS_ERROR = (
         ResultChangeKind.HARNESS_ERROR.value
     )  #: the second run has no result, although the first has one
-    #: an exploration's fault leads to a hazard that the first run calls survived
+    #: an exploration's cell without hazard is now hazardous, or not decided, for its runs have no result
     SMALLER_ENVELOPE = "smaller-envelope"
     UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
     SEVERITY_S0 = "severity:S0"  #: a hazard of class S0 or worse; in the first run a milder one or none
@@ -273,7 +273,17 @@ def findings_of_gates(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Ga
 
 def _smaller_envelopes(comparison: Comparison) -> Iterator[GateFinding]:
     changes = comparison.envelope_changes
-    undecided = [change.b for change in changes if not change.decided]
+    if mismatch := next((change.mismatch for change in changes if change.mismatch), ""):
+        raise MutatorError(
+            mismatch,
+            where=comparison.b.folder.path,
+            argument="fail_on",
+            expected=f"magnitudes, durations, starts and observe_s of {comparison.a.name}",
+            remedy="explore both versions with the same `mutator envelope`, or omit the gate",
+        )
+    # where every run has a result, what is not decided was not driven
+    undecided = [c.b for c in changes if not c.is_smaller and (c.became_undecided or not c.decided)]
+    undecided += [envelope for c in changes for envelope in (c.a, c.b) if not envelope.was_active]
     missing = [*planes_only_in(*comparison.envelopes), *undecided]
     if missing or not changes:
         raise MutatorError(
@@ -285,9 +295,11 @@ def _smaller_envelopes(comparison: Comparison) -> Iterator[GateFinding]:
         )
     compared = {experiment.id for experiment in comparison.b.experiments}  # `only` leaves some out
     for change in changes:
-        if change.proof and change.proof.experiment_id in compared:
+        if change.evidence and change.evidence.experiment_id in compared:
             yield GateFinding(
-                gate=Gate.SMALLER_ENVELOPE, experiment_id=change.proof.experiment_id, description=change.text
+                gate=Gate.SMALLER_ENVELOPE,
+                experiment_id=change.evidence.experiment_id,
+                description=change.text,
             )
 
 

@@ -5,39 +5,87 @@ from math import exp, lgamma
 
 from mutator.explore.cell_results import CellResult, CellState
 from mutator.explore.envelope import Envelope
+from mutator.explore.lattice import Cell
 from mutator.explore.plane_exploration import Validation
 
-CONFIDENCE_OF_EACH_LOOK = 0.9875  # 95 % for four looks together
+CONFIDENCE_OF_EACH_LOOK = 0.9875  # so that all looks, at most four, hold together at the next one
+CONFIDENCE_OF_ALL_LOOKS = 0.95
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failure:
-    """The smallest magnitude that led to a hazard, and the shortest duration for which it did.
+    """The smallest magnitude with a hazardous cell, and its shortest hazardous duration.
 
-    `neighbour` is the next shorter run of the same magnitude, which had no hazard; None without one.
+    `state` says how the cell is called hazardous. `result` is the run that proves it, of a shorter fault if
+    it is inferred; if it lies between runs, the nearest hazardous run, which is no proof. `neighbour` is the
+    run of the next shorter fault of the same magnitude, which had no hazard; None without one.
     """
 
     magnitude: float | None
     duration_s: float
+    state: CellState
     result: CellResult
     neighbour: CellResult | None
 
 
 def first_failure(envelope: Envelope, longest_s: float | None = None) -> Failure | None:
-    """Return the first failure among the cells that were driven; with `longest_s`, among those up to the
-    first duration that is at least as long. None if none was driven to a hazard.
+    """Return the first failure; with `longest_s`, among the cells up to the first duration that is at least
+    as long. None if no cell is called hazardous.
     """
     results = envelope.exploration.map.results
     count = len(envelope.durations_s) if longest_s is None else envelope.columns_up_to(longest_s)
-    for i, magnitude in enumerate(envelope.magnitudes):
-        for j, duration_s in enumerate(envelope.durations_s[:count]):
-            result = results.get((i, j))
-            if result and result.state is CellState.HAZARDOUS:
-                before = results.get((i, j - 1))
-                is_survived = before is not None and before.state is CellState.WITHOUT_HAZARD
-                neighbour = before if is_survived else None
-                return Failure(magnitude=magnitude, duration_s=duration_s, result=result, neighbour=neighbour)
+    for i, line in enumerate(envelope.cells):
+        j = next((j for j, state in enumerate(line[:count]) if state.is_hazardous), None)
+        if j is None or (result := nearest_hazardous_result(envelope, (i, j))) is None:
+            continue
+        before = results.get((i, j - 1))
+        is_survived = before is not None and before.state is CellState.WITHOUT_HAZARD
+        return Failure(
+            magnitude=envelope.magnitudes[i],
+            duration_s=envelope.durations_s[j],
+            state=line[j],
+            result=result,
+            neighbour=before if is_survived else None,
+        )
     return None
+
+
+def nearest_hazardous_result(envelope: Envelope, cell: Cell) -> CellResult | None:
+    """Return the run that proves a hazardous cell; without one, the nearest hazardous run of its line, then
+    of the plane. None if no run had a hazard.
+    """
+    plane_map = envelope.exploration.map
+    proof = plane_map.proof_of(cell)
+    if proof is not None and proof.state is CellState.HAZARDOUS:
+        return proof
+    return _nearest_result(envelope, cell, CellState.HAZARDOUS, len(envelope.durations_s))
+
+
+def nearest_undecided_result(envelope: Envelope, cell: Cell) -> CellResult | None:
+    """Return the run without a result that is nearest to a cell, of those that leave time to observe."""
+    return _nearest_result(envelope, cell, CellState.NOT_DECIDED, envelope.columns_up_to())
+
+
+def _nearest_result(envelope: Envelope, cell: Cell, state: CellState, columns: int) -> CellResult | None:
+    results = envelope.exploration.map.results
+    line, duration = cell
+    cells = [other for other, result in results.items() if result.state is state and other[1] < columns]
+    nearest = min(cells, key=lambda c: (abs(c[0] - line), abs(c[1] - duration), c), default=None)
+    return None if nearest is None else results[nearest]
+
+
+def undecided_results(envelope: Envelope) -> list[CellResult]:
+    """Return the runs that decide nothing although their faults leave time to observe what follows."""
+    count = envelope.columns_up_to()
+    results = sorted(envelope.exploration.map.results.items())
+    return [r for (_, j), r in results if j < count and r.state is CellState.NOT_DECIDED]
+
+
+def undecided_cell_count(envelope: Envelope) -> int:
+    """Return the number of cells whose faults leave time to observe, but of which nothing is said."""
+    count = envelope.columns_up_to()
+    states = (state for line in envelope.cells for state in line[:count])
+    return sum(not state.is_hazardous and not state.is_without_hazard for state in states)
 
 
 def hazardous_share(envelope: Envelope) -> float:

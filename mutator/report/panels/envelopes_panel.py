@@ -8,10 +8,10 @@ from mutator.report.explored_planes import (
     NO_PROBABILITY_NOTE,
     TABLE_NOTE,
     ExploredPlanes,
-    describe_plane_validation,
 )
 from mutator.report.panel import Panel, rendered
 from mutator.report.plane_drawing import draw_plane
+from mutator.report.plane_sentences import describe_plane_validation
 from mutator.report.reported_run import ReportedRun
 
 _MOST_OPEN_PICTURES = 12

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import pytest
+
 from mutator.comparison.envelope_changes import (
     compare_envelopes,
     describe_envelope_changes,
@@ -10,7 +12,9 @@ from mutator.comparison.envelope_changes import (
     remarks_on_planes,
 )
 from mutator.comparison.paired_rate_and_time_sheets import RunDisplayNames
-from tests.unit.mutator.explore.made_envelopes import MADE_PLANE, envelope_of, line, never
+from mutator.explore.cell_results import CellState
+from mutator.explore.envelope import Envelope
+from tests.unit.mutator.explore.made_envelopes import DRIVE, MADE_PLANE, envelope_of, line, never
 
 NAMES = RunDisplayNames(a="before", b="after")
 
@@ -29,6 +33,7 @@ def test_equal_envelopes_have_no_change() -> None:
     [change] = compare_envelopes(([envelope_of(line)], [envelope_of(line)]))
     assert (change.became_hazardous, change.became_safe, change.is_smaller) == (0, 0, False)
     sheet = envelopes_sheet([change], NAMES)
+    assert not change.mismatch
     assert sheet.lines[0][-3:] == ("3.41 m", "3.41 m", "no")
 
 
@@ -36,6 +41,49 @@ def test_cells_that_a_run_does_not_decide_do_not_count() -> None:
     """Only cells of which both runs say something are compared."""
     [change] = compare_envelopes(([envelope_of(never)], [envelope_of(line, most_runs=4)]))
     assert change.decided < envelope_of(line).exploration.map.lattice.size
+
+
+def test_a_hazard_between_runs_makes_an_envelope_smaller() -> None:
+    """Where no run proves what is called hazardous, the nearest run with a hazard is named."""
+    before, after = envelope_of(never), envelope_of(lambda m, d: 30.0 if m >= 5 else None)
+    between = [
+        (i, j)
+        for i, states in enumerate(after.cells)
+        for j, state in enumerate(states)
+        if state is CellState.BETWEEN_HAZARDOUS
+    ]
+    assert between
+    for cell in after.exploration.map.results:  # without hazard was called only what lies between
+        before.cells[cell[0]][cell[1]] = CellState.UNKNOWN
+    [change] = compare_envelopes(([before], [after]))
+    assert change.became_hazardous and change.is_smaller
+    assert change.evidence and change.evidence.state is CellState.HAZARDOUS
+    assert change.evidence.experiment_id.startswith(f"({between[0][0]},")
+
+
+def test_crashes_make_an_envelope_smaller() -> None:
+    """What was without hazard and is no longer decided is a loss, and a run without a result is named."""
+    crashed = envelope_of(never, crashes=lambda m, d: m > 20)
+    [change] = compare_envelopes(([envelope_of(never)], [crashed]))
+    assert change.is_smaller and change.became_undecided and not change.became_hazardous
+    assert change.evidence and change.evidence.state is CellState.NOT_DECIDED
+    [unfinished] = compare_envelopes(([envelope_of(never)], [envelope_of(never, most_runs=20)]))
+    assert unfinished.became_undecided and not unfinished.is_smaller
+
+
+@pytest.mark.parametrize(
+    ("other", "text"),
+    [
+        (envelope_of(never, replace(MADE_PLANE, magnitudes=MADE_PLANE.magnitudes[:9])), "magnitudes differ"),
+        (envelope_of(never, replace(MADE_PLANE, durations_s=[0.1, 1.0])), "durations in s differ"),
+        (envelope_of(never, drive=replace(DRIVE, start_s=6.0)), "starts in s differ (5 and 6)"),
+        (envelope_of(never, observe_s=5.0), "observation times in s differ (15 and 5)"),
+    ],
+)
+def test_unequal_planes_cannot_be_compared(other: Envelope, text: str) -> None:
+    """Cells of other faults, starts or windows prove nothing."""
+    [change] = compare_envelopes(([envelope_of(never)], [other]))
+    assert text in change.mismatch
 
 
 def test_planes_of_one_run_are_named() -> None:

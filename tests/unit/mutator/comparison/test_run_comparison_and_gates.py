@@ -18,6 +18,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.model import AfterHazard, Experiment, Outcome, Status
 from mutator.store.session_environments import SessionEnvironment
 from mutator.workspace import Workspace
+from tests.unit.mutator.explore.made_envelopes import envelope_of, never
 
 Write = Callable[..., Path]
 HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5, "hazards": (("H3", 4.0),)}
@@ -111,6 +112,22 @@ def test_the_gate_on_envelopes_needs_explorations(runs: tuple[Path, Path]) -> No
     """A gate that cannot fail must not pass."""
     with pytest.raises(MutatorError, match="no exploration"):
         findings_of_gates(compare_runs(*runs), [Gate.SMALLER_ENVELOPE])
+
+
+def test_the_gate_refuses_what_cannot_be_compared(runs: tuple[Path, Path]) -> None:
+    """Another window of observation, unfinished planes and faults that were never active are wrong input."""
+    before, inactive = envelope_of(never), envelope_of(never)
+    results = inactive.exploration.map.results
+    results.update({cell: replace(result, is_activated=False) for cell, result in results.items()})
+    for other, text in (
+        (envelope_of(never, observe_s=5.0), "observation times in s differ"),
+        (envelope_of(never, most_runs=20), "is not decided"),
+        (inactive, "is not decided"),
+    ):
+        comparison = replace(compare_runs(*runs), envelopes=([before], [other]))
+        with pytest.raises(MutatorError, match=text) as refusal:
+            findings_of_gates(comparison, [Gate.SMALLER_ENVELOPE])
+        assert refusal.value.remedy
 
 
 def test_differing_versions_are_reported(runs: tuple[Path, Path]) -> None:

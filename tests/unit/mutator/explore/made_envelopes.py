@@ -1,7 +1,9 @@
 """Envelopes of made-up planes."""
 
+from collections.abc import Callable
+
 from mutator.campaigns.exploration_section import ExplorationSection, ExploredPlane
-from mutator.explore.cell_results import Drive
+from mutator.explore.cell_results import CellResult, CellState, Drive
 from mutator.explore.envelope import Envelope
 from mutator.explore.lattice import durations_between, magnitudes_between
 from mutator.explore.plane_exploration import PlaneExploration
@@ -35,13 +37,20 @@ def envelope_of(
     most_runs: int = 10_000,
     drive: Drive = DRIVE,
     validation: int = 10,
+    observe_s: float = 15.0,
+    crashes: Callable[[float, float], bool] = lambda magnitude, duration_s: False,
 ) -> Envelope:
-    """Explore a plane, up to `most_runs` runs."""
-    section = ExplorationSection(planes=[plane], validation=validation)
+    """Explore a plane, up to `most_runs` runs. Runs of faults for which `crashes` holds have no result."""
+    section = ExplorationSection(planes=[plane], validation=validation, observe_s=observe_s)
     explored = PlaneExploration(plane=plane, drive=drive, section=section, seed=1, number=0)
     count = 0
     while count < most_runs and (cells := explored.propose(min(8, most_runs - count))):
         count += len(cells)
         for cell in cells:
-            explored.note(cell, result_of(truth, explored.map.lattice, cell))
+            lattice = explored.map.lattice
+            result = result_of(truth, lattice, cell)
+            if crashes(lattice.magnitudes[cell[0]] or 0.0, lattice.durations_s[cell[1]]):
+                reason = "ValueError: no lead"
+                result = CellResult(state=CellState.NOT_DECIDED, experiment_id=str(cell), reason=reason)
+            explored.note(cell, result)
     return Envelope(explored)

@@ -9,6 +9,7 @@ from mutator.explore.envelope_failures import (
     first_failure,
     hazardous_share,
 )
+from mutator.explore.envelope_texts import describe_envelope
 from tests.unit.mutator.explore.made_envelopes import envelope_of, line, never
 
 
@@ -19,6 +20,16 @@ def test_the_first_failure_is_the_smallest_then_the_shortest() -> None:
     assert failure and failure.magnitude == min(m for m in envelope.magnitudes if m and m >= 5.0)
     assert failure.duration_s >= 1.0 and failure.result.state is CellState.HAZARDOUS
     assert failure.neighbour and failure.neighbour.state is CellState.WITHOUT_HAZARD
+
+
+def test_the_first_failure_is_that_of_the_command_line() -> None:
+    """The shortest hazardous cell of the smallest magnitude that has one, inferred or not."""
+    envelope = envelope_of(lambda m, d: 0.6 if m >= 5 and d >= 3 else None)
+    failure = first_failure(envelope)
+    assert failure and failure.state is CellState.INFERRED and failure.result.state is CellState.HAZARDOUS
+    assert describe_envelope(envelope).endswith(
+        f"{failure.magnitude:g} m for {failure.duration_s:g} s is not"
+    )
 
 
 def test_a_shorter_duration_has_its_own_failure() -> None:

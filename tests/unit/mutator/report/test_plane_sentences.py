@@ -1,0 +1,111 @@
+"""The sentences on a plane, on made-up ones."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from mutator.explore.envelope import Envelope
+from mutator.report.plane_sentences import describe_plane, describe_plane_validation
+from tests.unit.mutator.explore.made_envelopes import MADE_PLANE, envelope_of, line, never
+from tests.unit.mutator.explore.made_planes import LATTICE
+
+NO_VALUE = replace(MADE_PLANE, spec="sensor/silence/no_data", magnitudes=[], unit="")
+NEGATIVE = replace(MADE_PLANE, magnitudes=[-value for value in MADE_PLANE.magnitudes])
+FINE = replace(MADE_PLANE, magnitudes=list(LATTICE.magnitudes), durations_s=list(LATTICE.durations_s))
+
+
+def sentence(envelope: Envelope) -> str:
+    return describe_plane(envelope, {"H1": "The car touches the vehicle ahead."})
+
+
+def holes(magnitude: float, duration_s: float) -> float | None:
+    """Hazards of single magnitudes, most of which only drawn cells can meet."""
+    return 20.0 if int(magnitude * 7 + 1) % 11 == 0 and 0.3 < duration_s < 2.0 else None
+
+
+def test_the_sentence_says_where_it_fails_and_what_was_driven() -> None:
+    """With units, start, scenario, hazard and time; cells that were not driven are not called tried."""
+    text = sentence(envelope_of(line))
+    assert text.startswith("No hazard of sensor/bias/distance of up to 3.41 m was found in A from 5 s, for ")
+    assert "; it first fails at 5 m for 1." in text
+    assert "(H1, the car touches the vehicle ahead, after 2.00 s). " in text
+    assert re.search(r"\. \d+ of 156 cells were driven, the others are inferred or between runs; at", text)
+    assert text.endswith("of the cells called without hazard may be hazardous (95 %, all looks together).")
+    assert "tried" not in text
+
+
+@pytest.mark.parametrize(
+    ("envelope", "text"),
+    [
+        (
+            envelope_of(never),
+            "No hazard of sensor/bias/distance of up to 50 m was found in A from 5 s, for ",
+        ),
+        (envelope_of(never, validation=0), " cells were driven; the others were not validated."),
+        (
+            envelope_of(lambda m, d: 1.0),
+            "Not even the smallest magnitude of sensor/bias/distance in A from",
+        ),
+        (envelope_of(never, most_runs=5), "in A from 5 s is not decided: 151 cells neither driven nor"),
+        (envelope_of(lambda m, d: 2.0 if d >= 1 else None, NO_VALUE), "found in A from 5 s for up to 0."),
+        (envelope_of(lambda m, d: 2.0, NO_VALUE), "called without hazard; it first fails at 0.01 s"),
+        (envelope_of(never, NO_VALUE), "12 of 12 cells were driven, among them each that is called without"),
+        (envelope_of(line, NEGATIVE), "(negative) of up to -3.41 m"),
+    ],
+)
+def test_the_sentence_fits_each_kind_of_plane(envelope: Envelope, text: str) -> None:
+    """Without hazards, with nothing survived, cut off, without values, with negative ones."""
+    assert text in sentence(envelope)
+
+
+def test_an_inferred_failure_names_its_run() -> None:
+    """The shortest fault that fails was not driven: a longer one shows that it does."""
+    text = sentence(envelope_of(lambda m, d: 0.6 if m >= 5 and d >= 3 else None))
+    assert re.search(r"first fails at 5 m for 0\.81 s \(inferred from run \(6, \d+\): H1, .* 0\.60 s\)", text)
+
+
+def test_crashed_runs_leave_a_plane_undecided() -> None:
+    """Without a result, no hazard can be excluded; a hazard elsewhere does not hide that."""
+    text = sentence(envelope_of(never, crashes=lambda m, d: m > 20))
+    assert re.search(r"is not decided: \d+ runs have no result \(the first: ValueError: no lead\)\.", text)
+    assert "No hazard" not in text
+    assert "Not decided: " in sentence(envelope_of(line, crashes=lambda m, d: m > 20))
+
+
+def test_a_fault_that_was_never_active_shows_nothing() -> None:
+    """Runs that equal the golden run are no evidence."""
+    envelope = envelope_of(never)
+    results = envelope.exploration.map.results
+    results.update({cell: replace(result, is_activated=False) for cell, result in results.items()})
+    text = sentence(envelope)
+    assert "is not decided: the fault was never active." in text and "No hazard" not in text
+
+
+def test_an_unfinished_validation_says_so() -> None:
+    """A cell that was drawn but not driven shows nothing."""
+    whole = envelope_of(line)
+    cut = envelope_of(line, most_runs=whole.run_count - 3)
+    text = describe_plane_validation(cut)
+    assert text == "Validation unfinished: 7 of 10 drawn cells driven, 0 of them hazardous."
+    assert "the validation of the others is unfinished" in sentence(cut)
+
+
+def test_the_validation_says_what_follows() -> None:
+    """The share that can be hazardous, with its level; or that every cell was driven."""
+    text = describe_plane_validation(envelope_of(line, validation=10))
+    assert re.fullmatch(
+        r"0 of 10 drawn cells hazardous: at most \d+ % of the cells called without hazard may be hazardous "
+        r"\(95 %, all looks together\)\.",
+        text,
+    )
+    assert describe_plane_validation(envelope_of(never, validation=0)) == "Not validated."
+    assert "these are all" in describe_plane_validation(envelope_of(never, validation=1000))
+    assert "Nothing to validate" in describe_plane_validation(envelope_of(never, NO_VALUE))
+
+
+def test_earlier_looks_are_shown() -> None:
+    """What repairs followed on is not hidden by the last look."""
+    text = describe_plane_validation(envelope_of(holes, FINE, validation=86))
+    assert text.startswith("0 of 86 drawn cells hazardous: at most 4.9 % of the cells")
+    assert text.endswith(" 2 looks before found 1 and 1 hazardous cells, whose lines were then searched.")
