@@ -29,12 +29,12 @@ def describe_envelope(envelope: Envelope) -> str:
         return f"{where}: {_durations_text(envelope)}"
     survived = envelope.largest_survived()
     survives = (
-        f"{magnitude_text(envelope, survived)} is survived for every duration up to {longest}, "
+        f"no hazard found up to {magnitude_text(envelope, survived)} for any duration up to {longest}; "
         if survived is not None
         else ""
     )
     duration = envelope.shortest_hazardous_s(failing)
-    return f"{where}: {survives}{_magnitude_text(envelope, failing)} for {duration:g} s is not"
+    return f"{where}: {survives}{_magnitude_text(envelope, failing)} for {duration:g} s is hazardous"
 
 
 def _undecided_text(envelope: Envelope) -> str:
