@@ -28,7 +28,7 @@ def test_the_first_failure_is_that_of_the_command_line() -> None:
     failure = first_failure(envelope)
     assert failure and failure.state is CellState.INFERRED and failure.result.state is CellState.HAZARDOUS
     assert describe_envelope(envelope).endswith(
-        f"{failure.magnitude:g} m for {failure.duration_s:g} s is not"
+        f"{failure.magnitude:g} m for {failure.duration_s:g} s is hazardous"
     )
 
 
