@@ -21,6 +21,7 @@ from mutator.explore.envelope_files import delete_envelopes, write_envelopes
 from mutator.explore.exploration import Exploration
 from mutator.explore.exploration_replay import ExplorationReplay
 from mutator.explore.exploration_run import BuildExperiment, find_drives, run_exploration
+from mutator.explore.finding_search import FindingSearch
 from mutator.model import AfterHazard, Experiment, Fault
 from mutator.store.run_progress import ProgressCallback
 from mutator.targets.stop_at_hazard_code import can_stop_at_hazard
@@ -79,6 +80,17 @@ def explore_envelopes(
     if explored.envelopes:
         write_envelopes(bench.path, explored)
     return explored
+
+
+def search_findings(
+    bench: Bench, section: ExplorationSection, selected_target: SelectedTarget, reading: str
+) -> FindingSearch:
+    """Search the planes of a section for hazardous faults, on its open bench."""
+    build = experiment_builder(selected_target, reading)
+    drives = find_drives(bench, selected_target.manifest, section, build)
+    search = FindingSearch(section=section, drives=drives, seed=section.planes[0].seed)
+    run_exploration(bench, search, build, within_budget(None))
+    return search
 
 
 def experiment_builder(selected_target: SelectedTarget, reading: str) -> BuildExperiment:

@@ -11,9 +11,9 @@ from mutator.api.benches import bench_values, distributor_of_cluster, warn_of_en
 from mutator.api.exploration_benches import (
     SEARCHED_DURATIONS,
     SEARCHED_MAGNITUDES,
-    experiment_builder,
     explore_envelopes,
     opened_exploration,
+    search_findings,
     within_budget,
 )
 from mutator.api.exploration_planes import chosen_planes
@@ -27,8 +27,7 @@ from mutator.api.target_and_fault_selection import (
 from mutator.campaigns.exploration_section import STRATEGIES, ExplorationSection, ExploredPlane
 from mutator.errors import MutatorError
 from mutator.execution.session_summary import Summary
-from mutator.explore.exploration_run import find_drives, run_exploration
-from mutator.explore.finding_search import Finding, FindingSearch, dominated_share
+from mutator.explore.finding_search import Finding, dominated_share
 from mutator.store.run_progress import ProgressCallback
 
 DEFAULT_POINTS, DEFAULT_LONGEST_S, DEFAULT_OBSERVE_S = 51, 15.0, 15.0
@@ -222,10 +221,7 @@ def search(
         distributor=distributor_of_cluster(cluster, insecure_network=insecure_network),
         progress=progress,
     ) as bench:
-        build = experiment_builder(selected_target, values["reading"])
-        drives = find_drives(bench, selected_target.manifest, section, build)
-        searched = FindingSearch(section=section, drives=drives, seed=seed)
-        run_exploration(bench, searched, build, within_budget(None))
+        searched = search_findings(bench, section, selected_target, values["reading"])
     warn_of_end(bench.summary)
     return Findings(
         run=Path(out),

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from mutator.api.benches import bench_values, distributor_of_cluster
+from mutator.api.benches import bench_values, distributor_of_cluster, warn_of_end
 from mutator.api.exploration_benches import (
     SEARCHED_DURATIONS,
     SEARCHED_MAGNITUDES,
-    experiment_builder,
     explore_envelopes,
     opened_exploration,
+    search_findings,
     within_budget,
 )
 from mutator.api.exploration_planes import chosen_planes
@@ -20,8 +20,6 @@ from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_scenarios import CampaignScenarios
 from mutator.campaigns.exploration_section import ExplorationSection
 from mutator.errors import MutatorError
-from mutator.explore.exploration_run import find_drives, run_exploration
-from mutator.explore.finding_search import FindingSearch
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
@@ -45,7 +43,8 @@ def explore_campaign(
     """Run a campaign that explores, or resume it. `refused` are given arguments that do not apply."""
     request = campaign.exploration_request
     assert request is not None
-    refused = [*refused, *(name for name in ("only", "exclude", "limit", "shard") if getattr(choices, name))]
+    planned_choices = ("only", "exclude", "limit", "shard", "series_mb")
+    refused = [*refused, *(name for name in planned_choices if getattr(choices, name) is not None)]
     if refused:
         raise MutatorError(
             f"`{refused[0]}` for campaign {campaign.name}, which explores",
@@ -96,10 +95,8 @@ def explore_campaign(
         if is_envelope:
             explore_envelopes(bench, section, selected_target, values["reading"], within_budget(None))
         else:
-            build = experiment_builder(selected_target, values["reading"])
-            drives = find_drives(bench, selected_target.manifest, section, build)
-            search = FindingSearch(section=section, drives=drives, seed=seed)
-            run_exploration(bench, search, build, within_budget(None))
+            search_findings(bench, section, selected_target, values["reading"])
+    warn_of_end(bench.summary)
     return Run(RunFolder.open(out), workspace, bench.summary)
 
 

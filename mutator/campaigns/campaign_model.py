@@ -287,6 +287,8 @@ class CampaignModel(StrictModel, title="The file"):
             "methods": self.methods != [Method.GUIDED],
             "seeds": self.seeds,
             "include": self.include,
+            "study": self.study,
+            "after_hazard": self.after_hazard is not AfterHazard.GO_ON,
         }
         for key, value in others.items():
             if value:

@@ -167,9 +167,7 @@ class Bench:
             return self._prove()
 
     def checked_golden_folders(self, experiments: Iterable[Experiment]) -> Mapping[GoldenRun, Path]:
-        """Check the golden runs of these experiments, without planning them, and return where each is until
-        the next call.
-        """
+        """Check the golden runs of experiments without planning these; where each is until the next call."""
         with self._calling():
             golden_runs = self._plan.golden_runs_with(self._check_batch(experiments, ""))
             return self._checks.checked_folders(self.path, golden_runs)

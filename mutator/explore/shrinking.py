@@ -159,9 +159,7 @@ class Shrinking:
         return hazardous[0] if hazardous else form
 
     def _smaller(self, axis: Axis) -> _Choice:
-        """Go down an axis between 0, which is no fault, and the form: first by numbers of one digit, then by
-        numbers of two digits.
-        """
+        """Make the form smaller on an axis, where 0 is no fault: try numbers of one digit, then of two."""
         numbers, low, form = self._numbers(axis), 0.0, self.smallest
         for digits in (1, 2):
             high = form.number(axis)

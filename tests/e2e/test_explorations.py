@@ -208,6 +208,8 @@ def test_a_campaign_explores(toycar: Workspace, tmp_path: Path) -> None:
         mutator.plan(path, workspace=toycar)
     with pytest.raises(mutator.MutatorError, match="`limit` for campaign exploring, which explores"):
         mutator.run(path, tmp_path / "other", choices=mutator.Choices(limit=3), workspace=toycar)
+    with pytest.raises(mutator.MutatorError, match="`series_mb` for campaign exploring, which explores"):
+        mutator.run(path, tmp_path / "other", choices=mutator.Choices(series_mb=0), workspace=toycar)
 
 
 @pytest.mark.parametrize(
@@ -216,6 +218,7 @@ def test_a_campaign_explores(toycar: Workspace, tmp_path: Path) -> None:
         ("seed: 3", "seed: 3\ntriggers: [always]", "no `triggers` with `explore`"),
         ("seed: 3", "seeds: {from: 1, to: 2}", "no `seeds` with `explore`"),
         ("seed: 3", "seed: 3\ninclude: hazard_without_fault", "no `include` with `explore`"),
+        ("seed: 3", "seed: 3\nafter_hazard: stop", "no `after_hazard` with `explore`"),
         ("starts: [1]", "starts: [-1]", "times in s from 0 on"),
         ("longest_s: 3", "longest_s: 0.01", "longest_s"),
         ("spec: sensor/lane/*", "spec: sensor/lane/*, values: 3", "without `values`, with `explore`"),
