@@ -40,7 +40,7 @@ class FormBuilder:
         by_place = RoundNumbers(least=1.0, step=1.0)
         is_distance = not variant.paired_draws and self._changes_nothing_at_0()
         if variant.draw.kind == "list":
-            values = _listed_up_to(draw_values(variant.draw, self.original.seed), value, is_distance)
+            values = _listed_up_to(self._listed_with_signs_of(variant, value), value, is_distance)
             return SizeAxis(largest=value, numbers=by_place, values=values)
         if not is_distance or value == 0:
             return SizeAxis(largest=value, numbers=by_place, values=_rounded(variant.draw, value))
@@ -122,8 +122,21 @@ class FormBuilder:
 
     def _fault_with(self, value: float | None) -> Fault:
         fault = self.original.fault
-        return self.selected_target.fault(
+        built = self.selected_target.fault(
             fault.spec, value=value, seed=self.original.seed, reading=fault.reading or None, beyond=True
+        )
+        # an exploration decides how long a fault lasts, whatever its spec declares
+        return built if fault.hold is not None else replace(built, hold=None)
+
+    def _listed_with_signs_of(self, variant: Variant, value: float) -> tuple[float, ...]:
+        """Return the values that a spec lists, without those that have another sign than `value`, or whose
+        paired values have another one than its.
+        """
+        seed = self.original.seed
+        listed = list(zip(*(draw_values(draw, seed) for draw in variant.all_draws), strict=True))
+        reference = next((values for values in listed if values[0] == value), (value,))
+        return tuple(
+            values[0] for values in listed if all(a * b >= 0 for a, b in zip(values, reference, strict=False))
         )
 
     def _changes_nothing_at_0(self) -> bool:

@@ -1,11 +1,14 @@
 """Shrinks an experiment: drives ever simpler forms of its fault as long as they keep the hazard."""
 
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from mutator._common.files import ScratchFolder
+from mutator.api.envelope_shrinks import EnvelopeShrinker
 from mutator.api.form_building import FormBuilder
 from mutator.api.run_contents import RunContents
 from mutator.api.smallest_form import SmallestForm
@@ -59,24 +62,39 @@ class Shrinker:
     def shrink(
         self, out: Path, *, workers: int, engine: str | None, notify: ProgressCallback | None
     ) -> SmallestForm:
-        """Find the smallest form on a bench in the run folder `out`, or go on with it there."""
+        """Find the smallest form on a bench in the run folder `out`, or go on with it there.
+
+        Where an envelope has the experiment, only its cells are looked at, unless the start may change.
+        """
         self._builder.check_spec_unchanged()
-        with (
-            opened_bench(
-                self.run.workspace,
-                out,
-                self._bench_values(),
-                workers=workers,
-                engine=engine,
-                notify=notify,
-            ) as bench,
-            finishing(bench),
-        ):
-            shrinking = Shrinking(self._space(bench))
-            run_shrinking(bench, shrinking, self._hazard, self._builder.build)
-        smallest = self._describe(shrinking, out)
+
+        @contextmanager
+        def open_bench() -> Iterator[Bench]:
+            values = self._bench_values()
+            with (
+                opened_bench(
+                    self.run.workspace, out, values, workers=workers, engine=engine, notify=notify
+                ) as bench,
+                finishing(bench),
+            ):
+                yield bench
+
+        in_envelope = None if self.changes_start else self._in_envelope
+        smallest = in_envelope.shrink(open_bench, out) if in_envelope else self._shrink_on(open_bench, out)
         self._prove(smallest)
         return smallest
+
+    @property
+    def _in_envelope(self) -> EnvelopeShrinker | None:
+        return EnvelopeShrinker.of_experiment(
+            self.run, self._selected_target, self._campaign, self.experiment, self.record
+        )
+
+    def _shrink_on(self, open_bench: Callable[[], AbstractContextManager[Bench]], out: Path) -> SmallestForm:
+        with open_bench() as bench:
+            shrinking = Shrinking(self._space(bench))
+            run_shrinking(bench, shrinking, self._hazard, self._builder.build)
+        return self._describe(shrinking, out)
 
     @property
     def _hazard(self) -> str:

@@ -69,6 +69,27 @@ def test_an_envelope_is_an_ordinary_finished_run(toycar: Workspace, tmp_path: Pa
 
 
 @pytest.mark.usefixtures("kept_checks")
+def test_shrinking_takes_what_the_envelope_has(toycar: Workspace, tmp_path: Path) -> None:
+    """At most three runs: the smallest cell with the hazard, and its neighbours on both axes without it."""
+    [envelope] = explore(toycar, tmp_path / "run")
+    run = mutator.load_run(tmp_path / "run", workspace=toycar)
+    results = envelope.exploration.map.results
+    largest = results[max(cell for cell, result in results.items() if result.state is CellState.HAZARDOUS)]
+    smallest = run.experiment(largest.experiment_id).shrink()
+    assert smallest.runs <= 3 and smallest.hazard == "H3"
+    assert isinstance(smallest.experiment.fault.value, float) and smallest.duration_s
+    assert smallest.experiment.fault.value in envelope.magnitudes
+    assert smallest.duration_s in envelope.durations_s
+    assert set(smallest.neighbours) == {"duration", "size"}
+    out = tmp_path / "shrunk" / f"run-{largest.experiment_id}"
+    assert out.exists() is (smallest.runs > 0)
+    records = dict(run.records) | (dict(mutator.load_run(out).records) if smallest.runs else {})
+    assert "H3" in dict(records[smallest.experiment.id].hazards)
+    assert all("H3" not in dict(records[e.id].hazards) for e in smallest.neighbours.values())
+    assert mutator.verify(smallest.run, workspace=toycar).passed
+
+
+@pytest.mark.usefixtures("kept_checks")
 @pytest.mark.parametrize(
     ("start", "text"), [("far", "does not record"), ("d_rel < 0", "does not record"), (99, "never meets")]
 )

@@ -1,6 +1,8 @@
 """Which sizes a fault has, and the experiments of its forms."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -66,3 +68,40 @@ def test_a_fault_that_the_library_no_longer_gives_is_refused(clone: Workspace) -
     elsewhere.check_spec_unchanged()
     assert elsewhere.sizes is None
     assert "no spec of this fault" in elsewhere.note
+
+
+_PAIRED_SPEC = """\
+schema: fault_spec/1
+module: sensor
+fault_type: pair
+about: Two values are wrong.
+variants:
+  both:
+    aim: H3
+    about: Distance and offset.
+    draw:
+      gap_m: {values: [-1, 1, 2, 3, 4]}
+      side_m: {values: [5, 5, -5, 6, 7]}
+    as_described:
+      injections:
+        - at: {file: toycar/sensing.py, function: Sensor.sense, after_assign: gap}
+          model: offset
+          unit: m
+          params: {by_m: gap}
+        - at: {file: toycar/sensing.py, function: Sensor.sense, after_assign: offset}
+          model: offset
+          unit: m
+          params: {by_m: side}
+"""
+
+
+def test_listed_values_with_another_sign_are_not_simpler(
+    copy_toycar: Callable[[Path], Workspace], tmp_path: Path
+) -> None:
+    """An error to the other side is another one; of values in pairs, both keep their sign."""
+    toycar = copy_toycar(tmp_path)
+    (toycar.library / "faults/sensor/pair.yaml").write_text(_PAIRED_SPEC)
+    experiment = mutator.build_experiment("sensor/pair/both", "A", 1.2, value=3, workspace=toycar)
+    sizes = FormBuilder(SelectedTarget.of(toycar), experiment).sizes
+    assert sizes
+    assert sizes.values == (1, 3)
