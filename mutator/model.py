@@ -367,3 +367,7 @@ class Record:
     against_golden: AgainstGolden | None = added_field(None)
     #: (name, first time in s) of each hazard in the drive that the golden run has, too, and that is no worse
     golden_hazards: tuple[tuple[str, float], ...] = added_field(())
+    #: when a compared channel last differed from golden, in s, if that was at least 2 s before the end
+    t_back: float | None = added_field(None)
+    #: whether the controller was not `engaged` at the end, although it was in the golden run
+    ended_disengaged: bool = added_field(False)

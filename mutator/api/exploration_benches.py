@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from mutator.explore.exploration import Exploration
 from mutator.explore.exploration_replay import ExplorationReplay
 from mutator.explore.exploration_run import BuildExperiment, find_drives, run_exploration
 from mutator.explore.finding_search import FindingSearch
+from mutator.explore.plane_building import explored_fault
 from mutator.model import AfterHazard, Experiment, Fault
 from mutator.store.run_progress import ProgressCallback
 from mutator.targets.stop_at_hazard_code import can_stop_at_hazard
@@ -94,15 +95,13 @@ def search_findings(
 
 
 def experiment_builder(selected_target: SelectedTarget, reading: str) -> BuildExperiment:
-    """Return what builds the experiments of planes. How long a fault lasts is the plane's, whatever its spec
-    declares.
-    """
+    """Return what builds the experiments of planes."""
     builder, after_hazard = ExperimentBuilder(selected_target), after_hazard_of(selected_target)
 
     @cache
     def fault_of(spec: str, magnitude: float | None, seed: int) -> Fault:
         fault = selected_target.fault(spec, value=magnitude, seed=seed, reading=reading, beyond=True)
-        return replace(fault, hold=None)
+        return explored_fault(fault, selected_target.manifest)
 
     def build(plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float) -> Experiment:
         return builder.build(

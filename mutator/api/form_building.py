@@ -9,6 +9,7 @@ from mutator.api.scenario_choice import digest_of_library_scenario
 from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.explore.fault_forms import FaultForm, SizeAxis
+from mutator.explore.plane_building import explored_fault
 from mutator.explore.round_numbers import RoundNumbers
 from mutator.faults.draw_specs import DrawSpec
 from mutator.faults.fault_specs import Variant
@@ -73,7 +74,9 @@ class FormBuilder:
         if self._variant is None:
             return
         value = fault.value if isinstance(fault.value, int | float) else None
-        if self._without_seeds(self._fault_with(value)) != self._without_seeds(fault):
+        now = self._fault_with(value)
+        expected = (now, explored_fault(now, self.selected_target.manifest))
+        if self._without_seeds(fault) not in map(self._without_seeds, expected):
             raise MutatorError(
                 f"the spec of {fault.label} changed since the run",
                 where=self.selected_target.workspace.spec(_spec_name(fault)).path,
@@ -115,7 +118,7 @@ class FormBuilder:
     def _fault(self, form: FaultForm) -> Fault:
         fault, sizes = self.original.fault, self.sizes
         if sizes is not None and form.size is not None and form.size != sizes.largest_size:
-            fault = self._fault_with(sizes.value(form.size))
+            fault = replace(self._fault_with(sizes.value(form.size)), hold=fault.hold, changes=fault.changes)
         if form.injection is None:
             return fault
         return replace(fault, injections=(fault.injections[form.injection],))

@@ -112,7 +112,7 @@ def envelopes_sheet(changes: Sequence[EnvelopeChange], names: RunDisplayNames) -
     note = (
         "Cells of which both runs say whether a hazard follows, with those between runs. An envelope is "
         f"smaller if a cell that {names.a} calls without hazard, driven or between runs, is hazardous in "
-        f"{names.b}, or not decided because runs there have no result."
+        f"{names.b}, or not decided because runs there have no result or ended disengaged."
     )
     return Sheet(name="envelopes", title="What is survived", note=note, heads=heads, lines=lines)
 

@@ -31,7 +31,11 @@ from mutator.outcomes.actuator_change_and_speeds import (
 )
 from mutator.outcomes.channel_departures import departures_from_golden
 from mutator.outcomes.failure_cause import judge_failure, run_error
-from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, load_judged_run
+from mutator.outcomes.hazard_and_metric_judgement import (
+    RunJudgement,
+    is_engaged_at_end,
+    load_judged_run,
+)
 from mutator.outcomes.lost_observed_values import find_lost_value
 from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.outcomes.verdict_rules import first_events_after, outcome_of
@@ -347,6 +351,8 @@ class ExperimentRunner:
             speeds=speeds_after_activation(self.manifest, reference, faulty, activation, end),
             against_golden=compared.case,
             golden_hazards=tuple(compared.golden_hazards),
+            t_back=difference.t_back,
+            ended_disengaged=not judged.is_engaged_at_end and is_engaged_at_end(self.manifest, reference),
         )
 
     def _detail(

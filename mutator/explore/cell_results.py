@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from mutator.model import Outcome, Record, Status
+from mutator.outcomes.golden_trace_comparison import BACK_TO_GOLDEN_S
 from mutator.targets.hazard_and_metric_definitions import MARGIN_PREFIX
 
 
@@ -13,6 +14,7 @@ class CellState(StrEnum):
 
     HAZARDOUS = "hazardous"  # driven: a hazard followed
     WITHOUT_HAZARD = "without_hazard"  # driven: no hazard within the window
+    DISENGAGED = "disengaged"  # driven: no hazard, but the controller ended disengaged or crashed
     NOT_DECIDED = "not_decided"  # driven, but neither can be said
     INFERRED = "inferred"  # not driven: a shorter fault reached a hazard while it was active
     BETWEEN_HAZARDOUS = "between_hazardous"  # not driven, between hazardous cells
@@ -22,6 +24,11 @@ class CellState(StrEnum):
     @property
     def is_hazardous(self) -> bool:
         return self in (CellState.HAZARDOUS, CellState.INFERRED, CellState.BETWEEN_HAZARDOUS)
+
+    @property
+    def is_failed(self) -> bool:
+        """Whether the cell is not survived: hazardous, or the controller ended disengaged."""
+        return self.is_hazardous or self is CellState.DISENGAGED
 
     @property
     def is_without_hazard(self) -> bool:
@@ -45,7 +52,7 @@ class CellResult:
     * `inferred_from_s`: the shortest duration for which the hazard follows from this run; None if it came
       after the end of the fault, which may then have caused it
     * `margins`: the smallest distance from each hazard that has a margin, by metric
-    * `reason`: why the cell is not decided
+    * `reason`: why the cell is not decided, or how the controller ended
     * `is_activated`: whether the injected code ran while the fault was active
     """
 
@@ -62,18 +69,25 @@ class CellResult:
 def judge_cell(record: Record, duration_s: float, drive: Drive, observe_s: float) -> CellResult:
     """Judge the run of a fault that began at `drive.start_s` and lasted `duration_s`.
 
-    Without a hazard, the drive must have gone on for `observe_s` after the fault.
+    Without a hazard, the drive must have gone on for `observe_s` after the fault, or have come back to the
+    golden run after it.
     """
     margins = {name: value for name, value in record.metrics if name.startswith(MARGIN_PREFIX)}
     name = record.experiment_id
+    if record.status is Status.CRASHED:
+        reason = record.detail or "the controller crashed"
+        return CellResult(state=CellState.DISENGAGED, experiment_id=name, reason=reason)
     if record.status is not Status.OK or record.outcome is Outcome.NOT_JUDGED:
         reason = record.detail or f"the run ended as {record.status}"
         return CellResult(state=CellState.NOT_DECIDED, experiment_id=name, reason=reason)
     if record.outcome is Outcome.HAZARD:
         hazard, time = record.hazards[0]
         return _hazardous_cell(name, hazard, time - drive.start_s, duration_s, drive.step_s, margins)
+    if record.ended_disengaged:
+        reason = "the controller was disengaged at the end"
+        return CellResult(state=CellState.DISENGAGED, experiment_id=name, margins=margins, reason=reason)
     observed_s = drive.end_s - drive.start_s - duration_s
-    if observed_s >= observe_s - drive.step_s / 2:
+    if observed_s >= observe_s - drive.step_s / 2 or _came_back(record, duration_s, drive):
         is_activated = record.outcome is not Outcome.NOT_ACTIVATED
         state = CellState.WITHOUT_HAZARD
         return CellResult(state=state, experiment_id=name, margins=margins, is_activated=is_activated)
@@ -82,6 +96,15 @@ def judge_cell(record: Record, duration_s: float, drive: Drive, observe_s: float
         experiment_id=name,
         margins=margins,
         reason=f"the drive ends {max(observed_s, 0.0):.2f} s after the fault",
+    )
+
+
+def _came_back(record: Record, duration_s: float, drive: Drive) -> bool:
+    """Whether the run was as golden from some time after the fault on, up to its end, and for long enough."""
+    fault_end_s = drive.start_s + duration_s
+    left_s = fault_end_s if record.t_manifest is None else record.t_back
+    return (
+        left_s is not None and drive.end_s - max(left_s, fault_end_s) >= BACK_TO_GOLDEN_S - drive.step_s / 2
     )
 
 

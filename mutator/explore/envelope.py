@@ -16,6 +16,7 @@ from mutator.explore.plane_map import Line
 CODE_BY_STATE = {
     CellState.HAZARDOUS: "H",
     CellState.WITHOUT_HAZARD: "o",
+    CellState.DISENGAGED: "d",
     CellState.NOT_DECIDED: "?",
     CellState.INFERRED: "h",
     CellState.BETWEEN_HAZARDOUS: "+",

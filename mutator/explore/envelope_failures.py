@@ -1,5 +1,6 @@
 """Where an envelope first fails, and how far its validation reaches."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, lgamma
 
@@ -58,18 +59,24 @@ def nearest_hazardous_result(envelope: Envelope, cell: Cell) -> CellResult | Non
     proof = plane_map.proof_of(cell)
     if proof is not None and proof.state is CellState.HAZARDOUS:
         return proof
-    return _nearest_result(envelope, cell, CellState.HAZARDOUS, len(envelope.durations_s))
+    return _nearest_result(envelope, cell, (CellState.HAZARDOUS,), len(envelope.durations_s))
 
 
 def nearest_undecided_result(envelope: Envelope, cell: Cell) -> CellResult | None:
-    """Return the run without a result that is nearest to a cell, of those that leave time to observe."""
-    return _nearest_result(envelope, cell, CellState.NOT_DECIDED, envelope.columns_up_to())
+    """Return the run that is nearest to a cell, of those that leave time to observe and have no result, or
+    ended disengaged.
+    """
+    return _nearest_result(
+        envelope, cell, (CellState.NOT_DECIDED, CellState.DISENGAGED), envelope.columns_up_to()
+    )
 
 
-def _nearest_result(envelope: Envelope, cell: Cell, state: CellState, columns: int) -> CellResult | None:
+def _nearest_result(
+    envelope: Envelope, cell: Cell, states: Sequence[CellState], columns: int
+) -> CellResult | None:
     results = envelope.exploration.map.results
     line, duration = cell
-    cells = [other for other, result in results.items() if result.state is state and other[1] < columns]
+    cells = [other for other, result in results.items() if result.state in states and other[1] < columns]
     nearest = min(cells, key=lambda c: (abs(c[0] - line), abs(c[1] - duration), c), default=None)
     return None if nearest is None else results[nearest]
 
@@ -85,7 +92,13 @@ def undecided_cell_count(envelope: Envelope) -> int:
     """Return the number of cells whose faults leave time to observe, but of which nothing is said."""
     count = envelope.columns_up_to()
     states = (state for line in envelope.cells for state in line[:count])
-    return sum(not state.is_hazardous and not state.is_without_hazard for state in states)
+    return sum(not state.is_failed and not state.is_without_hazard for state in states)
+
+
+def disengaged_cells(envelope: Envelope) -> list[Cell]:
+    """Return the driven cells without a hazard in which the controller ended disengaged or crashed."""
+    results = envelope.exploration.map.results.items()
+    return sorted(cell for cell, result in results if result.state is CellState.DISENGAGED)
 
 
 def hazardous_share(envelope: Envelope) -> float:
@@ -99,7 +112,7 @@ def hazardous_share(envelope: Envelope) -> float:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValidationCount:
     """What a validation found: of `drawn` cells out of `frame`, `driven` were driven, of which some were
-    `hazardous` and some `undecided`.
+    `hazardous`, some `undecided`, and in some the controller ended `disengaged`.
     """
 
     frame: int
@@ -107,6 +120,7 @@ class ValidationCount:
     driven: int
     hazardous: int
     undecided: int = 0
+    disengaged: int = 0
 
     @property
     def is_complete(self) -> bool:
@@ -120,9 +134,9 @@ class ValidationCount:
     @property
     def most_hazardous_share(self) -> float:
         """The upper limit of the share of hazardous cells, at `CONFIDENCE_OF_EACH_LOOK`: exact, for a draw
-        without replacement. Cells that were not decided count as hazardous.
+        without replacement. Cells that were not decided, or not survived, count as hazardous.
         """
-        failed = self.hazardous + self.undecided
+        failed = self.hazardous + self.undecided + self.disengaged
         low, high = failed, self.frame - self.drawn + failed
         while low < high:  # the largest number of hazardous cells that is not refuted
             middle = (low + high + 1) // 2
@@ -154,6 +168,7 @@ def count_validation(envelope: Envelope, validation: Validation) -> ValidationCo
         driven=len(driven),
         hazardous=driven.count(CellState.HAZARDOUS),
         undecided=driven.count(CellState.NOT_DECIDED),
+        disengaged=driven.count(CellState.DISENGAGED),
     )
 
 

@@ -38,7 +38,7 @@ def describe_envelope(envelope: Envelope) -> str:
 
 
 def _undecided_text(envelope: Envelope) -> str:
-    """Return how many cells that leave time to observe are not decided, and why; empty if all are."""
+    """Return how many cells that leave time to observe are not called survived, and why; empty if all are."""
     decidable = range(envelope.exploration.decidable)
     count = sum(not line[j].is_without_hazard for line in envelope.cells for j in decidable)
     reasons = Counter(
@@ -47,7 +47,11 @@ def _undecided_text(envelope: Envelope) -> str:
         if result.reason and j in decidable
     )
     why = f" ({reasons.most_common(1)[0][0]})" if reasons else ""
-    return f"{count:,} of {len(envelope.cells) * len(decidable):,} cells not decided{why}; " if count else ""
+    return (
+        f"{count:,} of {len(envelope.cells) * len(decidable):,} cells not decided or not survived{why}; "
+        if count
+        else ""
+    )
 
 
 def _durations_text(envelope: Envelope) -> str:

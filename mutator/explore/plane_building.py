@@ -1,9 +1,12 @@
 """Planes as users ask for them: the magnitudes of a variant, and durations."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from mutator.explore.lattice import magnitudes_between
 from mutator.faults.fault_specs import Variant
+from mutator.model import Fault
+from mutator.targets.manifest import TargetManifest
 
 _SMALLEST_SHARE = 0.01  # of the largest magnitude of a variant
 
@@ -25,6 +28,14 @@ def magnitudes_by_sign(variant: Variant, points: int) -> Iterator[list[float]]:
     for largest, sign in ((high, 1), (-low, -1)):
         if largest > 0:
             yield [sign * value for value in magnitudes_between(largest * _SMALLEST_SHARE, largest, points)]
+
+
+def explored_fault(fault: Fault, manifest: TargetManifest) -> Fault:
+    """Return the fault as it is explored. How long it lasts is the plane's, whatever its spec declares; so is
+    the traffic: changes with which scenarios are the same are left out.
+    """
+    changes = (name for name in fault.changes if not manifest.same_scenarios_by_change.get(name))
+    return replace(fault, hold=None, changes=tuple(changes))
 
 
 def _listed_by_sign(values: list[float]) -> Iterator[list[float]]:

@@ -74,8 +74,9 @@ class PlaneExploration:
         return self.map.cells(self._search().closed_lines())
 
     def failures(self, validation: Validation) -> list[Cell]:
-        """Return the drawn cells in which a hazard followed."""
-        return [cell for cell in validation.drawn if self.map.state(cell) is CellState.HAZARDOUS]
+        """Return the drawn cells that were not survived."""
+        states = ((cell, self.map.state(cell)) for cell in validation.drawn)
+        return [cell for cell, state in states if state and state.is_failed]
 
     def propose(self, most: int) -> list[Cell]:
         """Return at most `most` cells to drive next; none while results are awaited, and at the end."""

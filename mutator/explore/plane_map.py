@@ -97,11 +97,11 @@ class PlaneMap:
         return self.results.get(cell)
 
     def decided(self, line: int) -> list[tuple[int, bool]]:
-        """Return the decided cells of a line: the number of the duration, and whether it is hazardous."""
+        """Return the decided cells of a line: the number of the duration, and whether it is not survived."""
         if line not in self._decided_by_line:
             states = ((j, self.state((line, j))) for j in range(len(self.lattice.durations_s)))
             self._decided_by_line[line] = [
-                (j, state.is_hazardous) for j, state in states if state and state is not CellState.NOT_DECIDED
+                (j, state.is_failed) for j, state in states if state and state is not CellState.NOT_DECIDED
             ]
         return self._decided_by_line[line]
 
@@ -156,15 +156,19 @@ class PlaneMap:
             neighbours = lines[below][j], lines[above][j]
             if CellState.UNKNOWN in neighbours or CellState.NOT_DECIDED in neighbours:
                 continue
-            hazardous = [neighbour.is_hazardous for neighbour in neighbours]
-            if hazardous[0] is hazardous[1]:
-                lines[line][j] = _between(hazardous[0])
-            elif drawn is not None:
-                lines[line][j] = _between(drawn[j])
+            failed = [neighbour.is_failed for neighbour in neighbours]
+            if failed[0] is failed[1] or drawn is not None:
+                is_failed = failed[0] if failed[0] is failed[1] or drawn is None else drawn[j]
+                lines[line][j] = _between(is_failed, neighbours)
 
 
-def _between(is_hazardous: bool) -> CellState:
-    return CellState.BETWEEN_HAZARDOUS if is_hazardous else CellState.BETWEEN_WITHOUT
+def _between(is_failed: bool, neighbours: Sequence[CellState]) -> CellState:
+    """Return the state of a cell between neighbours; unknown beside one in which the controller disengaged,
+    because a hazard may follow there.
+    """
+    if not is_failed:
+        return CellState.BETWEEN_WITHOUT
+    return CellState.UNKNOWN if CellState.DISENGAGED in neighbours else CellState.BETWEEN_HAZARDOUS
 
 
 def _fill_gaps(line: Line) -> None:
@@ -172,15 +176,16 @@ def _fill_gaps(line: Line) -> None:
     ones than a hazardous last one.
     """
     decided = [
-        (j, state.is_hazardous)
+        (j, state.is_failed)
         for j, state in enumerate(line)
         if state not in (CellState.UNKNOWN, CellState.NOT_DECIDED)
     ]
     if not decided:
         return
-    for (before, was_hazardous), (after, is_hazardous) in pairwise([(-1, decided[0][1]), *decided]):
-        if was_hazardous is is_hazardous and CellState.NOT_DECIDED not in line[before + 1 : after]:
-            line[before + 1 : after] = [_between(is_hazardous)] * (after - before - 1)
-    last, is_last_hazardous = decided[-1]
-    if is_last_hazardous and CellState.NOT_DECIDED not in line[last:]:
-        line[last + 1 :] = [_between(True)] * (len(line) - last - 1)
+    for (before, was_failed), (after, is_failed) in pairwise([(-1, decided[0][1]), *decided]):
+        if was_failed is is_failed and CellState.NOT_DECIDED not in line[before + 1 : after]:
+            state = _between(is_failed, (line[max(before, 0)], line[after]))
+            line[before + 1 : after] = [state] * (after - before - 1)
+    last, is_last_failed = decided[-1]
+    if is_last_failed and CellState.NOT_DECIDED not in line[last:]:
+        line[last + 1 :] = [_between(True, line[last : last + 1])] * (len(line) - last - 1)

@@ -15,16 +15,23 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WITHOUT_COLOUR, _HAZARD_COLOUR, _UNDECIDED_COLOUR = "#009e73", "#d55e00", "#888888"
+_DISENGAGED_COLOUR = "#000000"
 _SHADES = (
     ((CellState.WITHOUT_HAZARD, CellState.BETWEEN_WITHOUT), _WITHOUT_COLOUR, 0.2, "without hazard"),
     ((CellState.INFERRED,), _HAZARD_COLOUR, 0.45, "hazard inferred"),
     ((CellState.HAZARDOUS, CellState.BETWEEN_HAZARDOUS), _HAZARD_COLOUR, 0.2, "hazardous"),
-    ((CellState.NOT_DECIDED, CellState.UNKNOWN), _UNDECIDED_COLOUR, 0.25, "not decided"),
+    (
+        (CellState.DISENGAGED, CellState.NOT_DECIDED, CellState.UNKNOWN),
+        _UNDECIDED_COLOUR,
+        0.25,
+        "not decided",
+    ),
 )
 _MARKS = (
     (CellState.WITHOUT_HAZARD, _WITHOUT_COLOUR, "o", "run without hazard"),
     (CellState.HAZARDOUS, _HAZARD_COLOUR, "s", "run with hazard"),
-    (CellState.NOT_DECIDED, _UNDECIDED_COLOUR, "x", "run that decides nothing"),
+    (CellState.DISENGAGED, _DISENGAGED_COLOUR, "x", "run that ended disengaged"),
+    (CellState.NOT_DECIDED, _UNDECIDED_COLOUR, ".", "run that decides nothing"),
 )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from mutator.outcomes.trace_and_record_loading import Trace, newest_values, times_of
 from mutator.targets.channels import Channel
 
+BACK_TO_GOLDEN_S = 2.0  # how long a run must be as golden to count as back
 _TIME_SLACK_S = 1e-9  # times are sums of steps, which round
 
 
@@ -16,6 +17,7 @@ class TraceDifference:
     """How a trace differs from the golden trace."""
 
     t_first: float | None  # time (s) of the first difference beyond tolerance
+    t_back: float | None  # time (s) of the last one, if the rest of the run is at least `BACK_TO_GOLDEN_S`
     max_dev: tuple[tuple[str, float], ...]  # largest difference of each compared channel in the whole run
     max_dev_in_drive: tuple[tuple[str, float], ...]  # the same up to the end of the drive
 
@@ -30,15 +32,23 @@ def compare_traces(
     """
     end = np.inf if t_end is None else t_end + _TIME_SLACK_S
     first = first_time_only_in_longer(golden[time_channel], faulty[time_channel])
+    last = -np.inf if first == np.inf else np.inf
     max_dev: list[tuple[str, float]] = []
     dev: list[tuple[str, float]] = []
     for channel in channels:
         channel_difference = channel_deviation(golden, faulty, channel, time_channel)
         first = min(first, channel_difference.t_first)
+        last = max(last, channel_difference.t_last)
         max_dev.append((channel.name, channel_difference.largest()))
         dev.append((channel.name, channel_difference.largest(end)))
-    t_first = None if first == np.inf else first
-    return TraceDifference(t_first=t_first, max_dev=tuple(max_dev), max_dev_in_drive=tuple(dev))
+    times = faulty[time_channel]
+    is_back = len(times) > 0 and -np.inf < last <= times[-1] - BACK_TO_GOLDEN_S + _TIME_SLACK_S
+    return TraceDifference(
+        t_first=None if first == np.inf else first,
+        t_back=float(last) if is_back else None,
+        max_dev=tuple(max_dev),
+        max_dev_in_drive=tuple(dev),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +58,7 @@ class ChannelDeviation:
     common_times: np.ndarray
     absolute_differences: np.ndarray
     t_first: float  # when it first exceeds the tolerance or the times differ; infinite if never
+    t_last: float  # when it last exceeds the tolerance; -infinite if never, infinite if the times differ
 
     def largest(self, end: float = np.inf) -> float:
         return float(self.absolute_differences[self.common_times <= end].max(initial=0.0))
@@ -60,12 +71,14 @@ def channel_deviation(golden: Trace, faulty: Trace, channel: Channel, time_chann
     differs = values[0] != values[1]
     begin = int(differs.argmax()) if differs.size else 0
     if not differs[begin : begin + 1].any():  # true of most channels
-        return ChannelDeviation(at[:0], at[:0], _first_unequal_time(*times))
+        unequal = _first_unequal_time(*times)
+        return ChannelDeviation(at[:0], at[:0], unequal, -np.inf if unequal == np.inf else np.inf)
     at, values = at[begin:], [values_of_run[begin:] for values_of_run in values]
     differences = _absolute_difference(*values)
     beyond = np.flatnonzero(differences > channel.tolerance)
-    first = float(at[beyond[0]]) if beyond.size else np.inf
-    return ChannelDeviation(at, differences, min(first, _first_unequal_time(*times)))
+    first, last = (float(at[beyond[0]]), float(at[beyond[-1]])) if beyond.size else (np.inf, -np.inf)
+    unequal = _first_unequal_time(*times)
+    return ChannelDeviation(at, differences, min(first, unequal), last if unequal == np.inf else np.inf)
 
 
 def values_at_common_time(

@@ -36,6 +36,7 @@ class RunJudgement:
     alerts: tuple[tuple[str, float], ...]  # name, time of every raise
     t_end: float | None  # when a terminal hazard ended the drive
     metrics: tuple[tuple[str, float], ...]  # including margins; metrics without a value are omitted
+    is_engaged_at_end: bool = True  # whether the controller drives in the last step; true if nothing says it
 
     @property
     def hazards_by_time(self) -> tuple[tuple[str, float], ...]:
@@ -108,7 +109,19 @@ def judge_run(
         alerts=tuple(alert_times(record, manifest.alerts)),
         t_end=t_end,
         metrics=tuple((name, value) for name, value in value_by_metric.items() if value is not None),
+        is_engaged_at_end=_is_engaged_at_end(manifest, values),
     )
+
+
+def is_engaged_at_end(manifest: TargetManifest, trace: Trace) -> bool:
+    """Whether the controller drives in the last step of a run; true if the manifest does not say when."""
+    return not manifest.engaged or _is_engaged_at_end(manifest, formula_values_by_name(manifest, trace))
+
+
+def _is_engaged_at_end(manifest: TargetManifest, values: ValuesByName) -> bool:
+    if not manifest.engaged or not len(values[TIME]):
+        return True
+    return bool(trace_formulas.condition_at_each_step(manifest.engaged, values)[-1])
 
 
 def formula_values_by_name(manifest: TargetManifest, trace: Trace) -> ValuesByName:

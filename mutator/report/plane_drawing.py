@@ -22,6 +22,7 @@ _CLASS_BY_STATE = {
     CellState.HAZARDOUS: "failed",
     CellState.BETWEEN_HAZARDOUS: "failed",
     CellState.INFERRED: "inferred",
+    CellState.DISENGAGED: "open",
     CellState.NOT_DECIDED: "open",
     CellState.UNKNOWN: "open",
 }
@@ -79,6 +80,9 @@ def _dots(envelope: Envelope, xs: _Edges, ys: _Edges) -> Iterator[str]:
         cells = cells_with((state,), envelope.cells)
         if paths := "".join(f"M{xs[j]} {ys[i]}h0" for i, j in cells):
             yield f'<path class="dots {name}" d="{paths}"/>'
+    disengaged = cells_with((CellState.DISENGAGED,), envelope.cells)
+    if paths := "".join(f"M{xs[j] - 3} {ys[i] - 3}l6 6m0-6l-6 6" for i, j in disengaged):
+        yield f'<path class="crosses" d="{paths}"/>'
 
 
 def _outline(cells: Iterable[Cell], xs: _Edges, ys: _Edges) -> str:

@@ -5,13 +5,14 @@ from collections.abc import Mapping
 
 from mutator._common.message_text import SHORT_ID_LENGTH, counted
 from mutator._common.phrase_texts import measured_time_text, planned_number_text
-from mutator.explore.cell_results import CellState
+from mutator.explore.cell_results import CellResult, CellState
 from mutator.explore.envelope import Envelope
 from mutator.explore.envelope_failures import (
     CONFIDENCE_OF_ALL_LOOKS,
     Failure,
     ValidationCount,
     count_validation,
+    disengaged_cells,
     first_failure,
     undecided_cell_count,
     undecided_results,
@@ -30,7 +31,8 @@ def describe_plane(envelope: Envelope, hazards: Mapping[str, str]) -> str:
     if failure is not None:
         fails = f"it first fails at {_failure_text(envelope, failure, hazards)}"
         text = f"{_without_hazard_text(envelope)}; {fails}."
-        text += f" Not decided: {undecided}." if undecided else ""
+    elif disengaged_cells(envelope):
+        text = f"{_without_hazard_text(envelope)}."
     elif undecided:
         fault = f"{fault_text(envelope)}{_up_to_largest(envelope)}"
         text = f"{fault} {_where(envelope)} is not decided: {undecided}."
@@ -40,7 +42,24 @@ def describe_plane(envelope: Envelope, hazards: Mapping[str, str]) -> str:
             f"No hazard of {fault_text(envelope)}{_up_to_largest(envelope)} was found {_where(envelope)}, "
             f"for up to {longest}."
         )
-    return f"{text} {_reach_text(envelope)}"
+    if undecided and (failure or disengaged_cells(envelope)):
+        text += f" Not decided: {undecided}."
+    return " ".join(filter(None, (text, _disengaged_text(envelope), _reach_text(envelope))))
+
+
+def _disengaged_text(envelope: Envelope) -> str:
+    """Return in how many runs the controller did not stay engaged; empty without any."""
+    cells = disengaged_cells(envelope)
+    if not cells:
+        return ""
+    magnitude, duration_s = envelope.magnitudes[cells[0][0]], envelope.durations_s[cells[0][1]]
+    what = [magnitude_text(envelope, magnitude)] if magnitude is not None else []
+    result = envelope.exploration.map.results[cells[0]]
+    smallest = f"{' for '.join([*what, f'{duration_s:g} s'])}, {_short_reason(result)}"
+    runs = counted(len(cells), "run")
+    return (
+        f"{runs} without a hazard ended with the controller disengaged or crashed (the smallest: {smallest})."
+    )
 
 
 def is_undecided(envelope: Envelope) -> bool:
@@ -57,9 +76,13 @@ def describe_undecided(envelope: Envelope) -> str:
         return ""
     if not results:
         return f"{counted(count, 'cell')} neither driven nor between runs that agree"
-    reason = next(iter(results[0].reason.splitlines()), "")[:_MOST_REASON_LENGTH].rstrip(".")
+    reason = _short_reason(results[0])
     verb = "has" if len(results) == 1 else "have"
     return f"{counted(len(results), 'run')} {verb} no result (the first: {reason})"
+
+
+def _short_reason(result: CellResult) -> str:
+    return next(iter(result.reason.splitlines()), "")[:_MOST_REASON_LENGTH].rstrip(".")
 
 
 def describe_plane_validation(envelope: Envelope) -> str:
@@ -76,6 +99,7 @@ def _last_look_text(count: ValidationCount) -> str:
         return "Nothing to validate: each cell called without hazard was driven."
     drawn = counted(count.drawn, "drawn cell")
     hazardous = f"hazardous, {count.undecided} not decided" if count.undecided else "hazardous"
+    hazardous += f", {count.disengaged} ended disengaged" if count.disengaged else ""
     if not count.is_complete:
         return (
             f"Validation unfinished: {count.driven} of {drawn} driven, {count.hazardous} of them {hazardous}."

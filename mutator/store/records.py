@@ -22,8 +22,8 @@ LINE_SCHEMA_BY_FOLDER = {
 }
 _RECORD_FIELDS = tuple(field.name for field in fields(Record))
 _DATACLASS_FIELDS = ("activation", "error")  # fields that contain dataclasses
-# left out while they have no value, which is so unless the golden run has a hazard
-_OMITTED_FIELDS = ("against_golden", "golden_hazards")
+# left out while they have no value, as in most records
+_OMITTED_FIELDS = ("against_golden", "golden_hazards", "t_back", "ended_disengaged")
 
 
 def record_as_json(record: Record) -> dict[str, Any]:
@@ -60,6 +60,8 @@ def record_from_json(data: Mapping[str, Any]) -> Record:
         speeds=_name_value_pairs(data.get("speeds", [])),
         against_golden=AgainstGolden(data["against_golden"]) if data.get("against_golden") else None,
         golden_hazards=_name_value_pairs(data.get("golden_hazards", [])),
+        t_back=data.get("t_back"),
+        ended_disengaged=bool(data.get("ended_disengaged", False)),
     )
 
 

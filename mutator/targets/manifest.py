@@ -116,6 +116,7 @@ class TargetManifest:
     same_scenarios_by_change: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     message_readers: Mapping[str, MessageReader] = field(default_factory=dict)
     speed: str = ""  # formula of the car's speed in m/s
+    engaged: str = ""  # condition that holds while the controller drives
     sandbox: bool = False  # whether the target's code runs in a sandbox
 
     @property
@@ -163,7 +164,8 @@ class TargetManifest:
         channels = [channel.name for channel in self.channels]
         names = self.observation.names_for_trace_formulas(channels)
         needed = self.observation.names_with_inputs(
-            _names_used_in_criteria(self.hazard_rules, self.metrics, names) | set(names_in(self.speed or "0"))
+            _names_used_in_criteria(self.hazard_rules, self.metrics, names)
+            | {name for text in (self.speed, self.engaged) if text for name in names_in(text)}
         )
         return tuple(channel for channel in self.channels if channel.name in needed)
 

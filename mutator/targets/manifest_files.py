@@ -12,7 +12,7 @@ from mutator.config.yaml_source_lines import YamlSource
 from mutator.targets.confined_relative_paths import clean_relative_path
 from mutator.targets.hazards_and_metrics_yaml import HazardModel, MetricModel, build_hazards, build_metrics
 from mutator.targets.manifest import FilmCommands, TargetManifest
-from mutator.targets.manifest_formulas import manifest_formula
+from mutator.targets.manifest_formulas import manifest_condition, manifest_formula
 from mutator.targets.message_readers_yaml import MessageReaderModel, build_message_readers
 from mutator.targets.observation_yaml import ObservationModel, build_observation
 from mutator.targets.overhead_view_yaml import OverheadViewModel, build_overhead_view
@@ -128,6 +128,12 @@ class ManifestModel(StrictModel, title="The file"):
         description="The speed of the car in m/s: a formula over channels and derived values. With it, "
         "results have the highest and lowest speed after an activation.",
     )
+    engaged: str | None = Field(
+        None,
+        description="When the controller drives: a condition over channels and derived values. A run that "
+        "ends without it, although its golden run ends with it, is not [survived](../how-to/"
+        "find-what-is-survived.md#what-the-cells-mean).",
+    )
     alerts: list[str] = Field(
         default_factory=list,
         description="The names of the alerts to use; other alerts in a record are ignored.",
@@ -208,6 +214,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         film=model.film,
         message_readers=build_message_readers(model.messages, source),
         speed=manifest_formula(model.speed, judgeable_names, source, ("speed",)),
+        engaged=manifest_condition(model.engaged, judgeable_names, source, ("engaged",)),
     )
 
 

@@ -61,6 +61,12 @@ MODELS: dict[str, tuple[str, Anchor, dict[str, Value]]] = {
     "stale": ("stale", CLOSING_VALUE, {"steps": 9}),
     "swapped_arguments": ("swapped_arguments", AT_LEAST, {"first": 1, "second": 2}),
     "unit_mix_up": ("unit_mix_up", GAP_VALUE, {"written_in": "kph", "read_as": "mps"}),
+    "waveform": (
+        "waveform",
+        OFFSET,
+        {"target": "offset", "by": 0.8, "shape": "alternating", "period": 1.0, "seed": 1},
+    ),
+    "bounded noise": ("waveform", GAP_VALUE, {"by": 9.0, "shape": "noise", "low": 0.0, "seed": 5}),
     "wrong_branch": ("wrong_branch", TOO_FAST, {"holds": "always"}),
     "image_effect": (
         "image_effect",

@@ -59,6 +59,12 @@ FAULTS: list[dict[str, Any]] = [
     {"at": OFFSET, "model": "noise", "unit": "m", "params": {"std_m": 0.3}},
     {"at": OFFSET, "model": "clamp", "unit": "m", "params": {"high_m": 0.01}},
     {"at": OFFSET, "model": "quantise", "unit": "m", "params": {"step_m": 0.5}},
+    {
+        "at": OFFSET,
+        "model": "waveform",
+        "unit": "m",
+        "params": {"by_m": 0.5, "shape": "pulses", "period_s": 0.5, "width_s": 0.1},
+    },
     {"at": OFFSET, "model": "nan"},
     {"at": OFFSET, "model": "infinity", "params": {"negative": True}},
     {"at": OFFSET, "model": "none"},

@@ -32,6 +32,7 @@ _HTML_TEMPLATE = """\
 <li><i class="dot survived"></i>run without a hazard</li>
 <li><i class="dot failed"></i>run with a hazard</li>
 <li><i class="dot open"></i>run that decides nothing</li>
+<li><i class="cross">×</i>run without a hazard, whose controller ended disengaged or crashed</li>
 <li><i class="shade survived"></i>without hazard</li>
 <li><i class="shade failed"></i>hazardous</li>
 <li><i class="shade inferred"></i>inferred: a shorter fault reached its hazard while it was active</li>

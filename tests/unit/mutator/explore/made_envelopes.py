@@ -39,8 +39,11 @@ def envelope_of(
     validation: int = 10,
     observe_s: float = 15.0,
     crashes: Callable[[float, float], bool] = lambda magnitude, duration_s: False,
+    without_result: CellState = CellState.NOT_DECIDED,
 ) -> Envelope:
-    """Explore a plane, up to `most_runs` runs. Runs of faults for which `crashes` holds have no result."""
+    """Explore a plane, up to `most_runs` runs. Those of faults for which `crashes` holds have the state
+    `without_result`.
+    """
     section = ExplorationSection(planes=[plane], validation=validation, observe_s=observe_s)
     explored = PlaneExploration(plane=plane, drive=drive, section=section, seed=1, number=0)
     count = 0
@@ -51,6 +54,6 @@ def envelope_of(
             result = result_of(truth, lattice, cell)
             if crashes(lattice.magnitudes[cell[0]] or 0.0, lattice.durations_s[cell[1]]):
                 reason = "ValueError: no lead"
-                result = CellResult(state=CellState.NOT_DECIDED, experiment_id=str(cell), reason=reason)
+                result = CellResult(state=without_result, experiment_id=str(cell), reason=reason)
             explored.note(cell, result)
     return Envelope(explored)

@@ -41,6 +41,7 @@ NAMES = [
     "stuck",
     "swapped_arguments",
     "unit_mix_up",
+    "waveform",
     "wrong_branch",
 ]
 OF_OPERATORS = [

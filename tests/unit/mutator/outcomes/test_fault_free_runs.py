@@ -25,6 +25,7 @@ MANIFEST: Any = SimpleNamespace(
     criteria_channels=(),
     channels=(),
     observation=SimpleNamespace(derived=()),
+    engaged="",
     alerts=("fcw", "late"),
     non_actuator_channels=(Channel(name="v", unit="m/s"), Channel(name="not_recorded", unit="m")),
 )

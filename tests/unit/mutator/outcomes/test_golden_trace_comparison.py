@@ -70,6 +70,25 @@ def test_shared_times_do_not_change_a_comparison(times: np.ndarray) -> None:
     assert compare_traces(golden, shared, [GAS], "t") == compare_traces(golden, faulty, [GAS], "t")
 
 
+@pytest.mark.parametrize(
+    ("gas", "brake", "back"),
+    [
+        ([0, 1, 0, 0, 0], [0, 0, 0, 0, 0], 1.0),
+        ([0, 1, 0, 0, 0], [0, 0, 1, 0, 0], 2.0),  # the last channel to come back
+        ([0, 1, 0, 1, 0], [0, 0, 0, 0, 0], None),  # as golden for the last step alone
+        ([0, 1, 0, 0], [0, 0, 0, 0], None),  # the run is shorter
+        ([0, 0, 0, 0, 0], [0, 0, 0, 0, 0], None),  # it never left golden
+    ],
+)
+def test_a_run_is_back_if_it_ends_as_golden_for_two_seconds(
+    gas: list[float], brake: list[float], back: float | None
+) -> None:
+    seconds = np.arange(5.0)
+    golden = {"t": seconds, "gas": np.zeros(5), "brake": np.zeros(5)}
+    faulty = {"t": seconds[: len(gas)], "gas": np.array(gas), "brake": np.array(brake)}
+    assert compare_traces(golden, faulty, [GAS, BRAKE], "t").t_back == back
+
+
 def test_the_first_and_the_largest_difference_are_found() -> None:
     golden = trace(gas=[0, 0, 0, 0, 0], brake=[1, 1, 1, 1, 1])
     faulty = trace(gas=[0, 0, 0, 0.5, -2], brake=[1, 1, 1.25, 1, 1])

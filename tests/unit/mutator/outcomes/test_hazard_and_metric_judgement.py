@@ -10,7 +10,12 @@ import numpy as np
 import pytest
 
 from mutator.errors import BadOutput, MutatorError
-from mutator.outcomes.hazard_and_metric_judgement import RunJudgement, judge_run, load_judged_run
+from mutator.outcomes.hazard_and_metric_judgement import (
+    RunJudgement,
+    is_engaged_at_end,
+    judge_run,
+    load_judged_run,
+)
 from mutator.outcomes.trace_and_record_loading import Trace
 from mutator.targets.manifest import TargetManifest
 
@@ -305,3 +310,14 @@ def test_temporal_logic_needs_even_steps(write: Write) -> None:
     manifest = write('hazards: {LATE: {stl: "speed < 3"}}\n')
     with pytest.raises(BadOutput, match="a step of 2 s at 4 s"):
         judged(manifest, time=np.array([0.0, 1, 2, 3, 4, 6]))
+
+
+@pytest.mark.parametrize(
+    ("rest", "is_engaged"), [("engaged: force > 0\n", False), ("engaged: gap < 9\n", True), ("", True)]
+)
+def test_the_last_step_says_whether_the_controller_drives(write: Write, rest: str, is_engaged: bool) -> None:
+    """By the manifest's condition; without one, nothing says that it does not."""
+    manifest = write(f"hazards: {{HIT: {{when: gap < -9}}}}\n{rest}")
+    assert judged(manifest).is_engaged_at_end is is_engaged
+    trace = {"time": T, "gap": GAP, "speed": SPEED, "force": SPEED}
+    assert is_engaged_at_end(manifest, trace) is is_engaged

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from mutator.explore.cell_results import CellState
 from mutator.explore.envelope import Envelope
 from mutator.explore.lattice import durations_between, magnitudes_between
 from mutator.report.explored_planes import ExploredPlanes
@@ -54,6 +55,14 @@ def test_islands_are_outlined() -> None:
     assert 'class="island"' in draw_plane(small, "") and 'class="island"' not in draw_plane(
         envelope_of(line), ""
     )
+
+
+def test_runs_that_ended_disengaged_are_crosses() -> None:
+    """Which no other kind of run has."""
+    drawn = draw_plane(
+        envelope_of(never, crashes=lambda m, d: m > 20, without_result=CellState.DISENGAGED), ""
+    )
+    assert 'class="crosses"' in drawn and 'class="crosses"' not in draw_plane(envelope_of(never), "")
 
 
 def test_ticks_are_apart() -> None:

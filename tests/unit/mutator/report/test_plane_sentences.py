@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from mutator.explore.cell_results import CellState
 from mutator.explore.envelope import Envelope
 from mutator.report.plane_sentences import describe_plane, describe_plane_validation
 from tests.unit.mutator.explore.made_envelopes import MADE_PLANE, envelope_of, line, never
@@ -71,6 +72,19 @@ def test_crashed_runs_leave_a_plane_undecided() -> None:
     assert re.search(r"is not decided: \d+ runs have no result \(the first: ValueError: no lead\)\.", text)
     assert "No hazard" not in text
     assert "Not decided: " in sentence(envelope_of(line, crashes=lambda m, d: m > 20))
+
+
+def test_a_controller_that_ends_disengaged_is_counted_apart() -> None:
+    """It has not survived, which ends what is survived, but no hazard is claimed."""
+    envelope = envelope_of(never, crashes=lambda m, d: m > 20, without_result=CellState.DISENGAGED)
+    text = sentence(envelope)
+    assert re.match(
+        r"No hazard of sensor/bias/distance of up to 1\d\.?\d* m was found in A from 5 s, for", text
+    )
+    assert re.search(r"\d+ runs without a hazard ended with the controller disengaged or crashed \(", text)
+    assert "first fails" not in text and not envelope.survives(25.0, 0.1) and envelope.survives(10.0, 1.0)
+    assert {"d", "o"} <= set("".join(envelope.as_json()["cells"]))
+    assert "d" not in "".join(envelope_of(never).as_json()["cells"])
 
 
 def test_a_fault_that_was_never_active_shows_nothing() -> None:
