@@ -1,7 +1,7 @@
 """Find the fault library, the templates and the targets."""
 
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from importlib import import_module
@@ -20,6 +20,8 @@ from mutator._common.library_and_run_folder_search import (
 from mutator._common.message_text import counted, describe_choices, spelling_suggestion
 from mutator._common.shipped_files import shipped_folder
 from mutator._common.table_rendering import TextTable
+from mutator.defences.defence import Defence
+from mutator.defences.defence_yaml import load_defence
 from mutator.errors import MutatorError
 from mutator.families.family import Family
 from mutator.families.family_yaml import load_family
@@ -29,6 +31,7 @@ from mutator.faults.fault_specs import FaultSpec, load_spec
 from mutator.faults.library_readings import SpecReadings, load_readings
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import ConcreteScenario, Fault
+from mutator.mutants.defended_target import defended_manifest
 from mutator.results.table_columns import check_column_names
 from mutator.store.planned_scenarios import PlannedScenarios, planned_scenarios_of
 from mutator.stpa.accidents_and_hazards import HazardList, load_hazard_list
@@ -122,6 +125,19 @@ class Workspace:
         manifest = replace(manifest, sandbox=self.sandbox)
         check_column_names(manifest)
         return manifest
+
+    @property
+    def defences(self) -> Mapping[str, Path]:
+        """The defences of the library by name; `defence` reads one."""
+        return self._path_by_name("defences")
+
+    def defence(self, name: str | Path) -> Defence:
+        """Return the defence with this name or path."""
+        return load_defence(self._find_file("defences", name, "defence"), self.templates)
+
+    def defended(self, manifest: TargetManifest, names: Iterable[str]) -> TargetManifest:
+        """Return the target with these defences of the library in its tree."""
+        return defended_manifest(manifest, [self.defence(name) for name in names], self.templates)
 
     def scale_of(self, manifest: TargetManifest) -> SeverityScale | None:
         """Return the severity scale of a target, with the rules for its hazards; None without `severity`.

@@ -8,6 +8,7 @@ from typing import Any
 from mutator.model import AnchorKind, FaultLocation
 
 PROBE_MODULE_NAME = "_fi"  # reserved for the probe's module in every mutant (mutants/probe_contract.py)
+DEFENCE_MODULE_NAME = "_fd"  # reserved for the module that runs the defences of a tree
 
 # what `ast` raises for invalid or too deeply nested source
 _INVALID_SOURCE_ERRORS = (SyntaxError, ValueError, RecursionError, MemoryError)

@@ -63,7 +63,7 @@ def remove_files(names: Iterable[str], tree: Path) -> None:
 
 
 def _compiled(tree: SourceTree, name: str) -> _CompiledFile:
-    return tree.derive_once(name, _compile_file)
+    return tree.derive_once(name, _compile_file, with_defence_lines=True)
 
 
 def _compile_file(name: str, data: bytes, _: Path) -> _CompiledFile:

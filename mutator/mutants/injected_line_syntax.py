@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
-from mutator.config.location_syntax import PROBE_MODULE_NAME
+from mutator.config.location_syntax import DEFENCE_MODULE_NAME, PROBE_MODULE_NAME
 from mutator.model import Injection
 
 PROBE_IMPORT_TAG = "probe"  # on the line that imports the probe
@@ -227,6 +227,16 @@ def probe_import_line(package: str | None) -> str:
         f"from {package} import {PROBE_MODULE_NAME}" if package else f"import {PROBE_MODULE_NAME}",
         PROBE_IMPORT_TAG,
     )
+
+
+def defence_line(code: str, tag: str) -> str:
+    """Return a line of a defence: `import`, `observe` or `command`."""
+    return f"{code}  # fd:{tag}"
+
+
+def defence_import_line(package: str | None) -> str:
+    name = DEFENCE_MODULE_NAME
+    return defence_line(f"from {package} import {name}" if package else f"import {name}", "import")
 
 
 def observation_call_source(expressions: Sequence[tuple[str, str]]) -> str:

@@ -33,6 +33,7 @@ from mutator.mutants.source_parsing import (
     translate_libcst_errors,
 )
 from mutator.mutants.standalone_function_compilation import list_outermost_function_lines
+from mutator.targets.defence_lines import with_empty_defence_lines
 from mutator.targets.source_tree import SourceTree
 
 
@@ -56,8 +57,11 @@ class ResolvedAnchor:
 
 @dataclass(frozen=True)
 class ParsedFile:
+    """A parsed file. Lines of defences are in `data` and `lines`, and empty in all that was parsed."""
+
     path: str
     data: bytes
+    target_data: bytes  # with empty lines instead of those of defences
     lines: tuple[bytes, ...]  # without the byte order mark
     logical_lines: LogicalLines
     encoding: str
@@ -125,13 +129,14 @@ class ParsedFile:
 
 def parsed_file(tree: SourceTree, path: str) -> ParsedFile:
     """Parse the file only once; MutatorError if it is not a Python file of the target."""
-    return tree.derive_once(path, parse_file)
+    return tree.derive_once(path, parse_file, with_defence_lines=True)
 
 
 @delaying_interrupts()
 def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
     """Parse a file of the target; MutatorError if it is not Python, or already has injected lines."""
     where = root / path
+    defended, data = data, with_empty_defence_lines(data)
     check_line_ends_and_tags(data, where)
     tree = parse_with_python(data, where)
     with translate_libcst_errors(where):
@@ -139,8 +144,9 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
         logical_lines = LogicalLines.of(data)
         return ParsedFile(
             path=path,
-            data=data,
-            lines=tuple(data.removeprefix(BOM_UTF8).splitlines(keepends=True)),
+            data=defended,
+            target_data=data,
+            lines=tuple(defended.removeprefix(BOM_UTF8).splitlines(keepends=True)),
             logical_lines=logical_lines,
             encoding=module.encoding.removesuffix("-sig"),
             newline=module.default_newline.encode(),

@@ -16,14 +16,18 @@ from mutator.errors import MutatorError
 from mutator.mutants.changeable_expressions import Expression
 from mutator.mutants.constants_and_defaults import ConstantOrDefault
 from mutator.mutants.injected_line_syntax import (
+    OBSERVATION_TAG,
     active_check_source,
     changed_value_prefix,
+    defence_import_line,
+    defence_line,
     probe_import_line,
     replacement_tag,
     tag_of,
     tagged_line,
 )
 from mutator.mutants.parsed_files_and_anchors import ParsedFile, ResolvedAnchor
+from mutator.targets.defence_lines import defence_tag_of
 
 
 class EditRank(IntEnum):
@@ -75,13 +79,33 @@ class PatchPiece:
 
 def insertion_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str) -> LineEdit:
     """Return the edit that inserts `code` (4 spaces per indentation level) at `anchor`, each line tagged."""
-    lines = _tagged_lines(file, anchor, code, tag)
-    index, rank = (
-        (anchor.end_line, EditRank.AFTER_PREVIOUS_LINE)
-        if anchor.inserts_after
-        else (anchor.first_line, EditRank.BEFORE)
+    return _insertion_of_lines(file, anchor, _tagged_lines(file, anchor, code, tag))
+
+
+def _insertion_of_lines(file: ParsedFile, anchor: ResolvedAnchor, lines: tuple[bytes, ...]) -> LineEdit:
+    # at a fault's own place, a defence observes the truth before the fault, and changes commands after it
+    if not anchor.inserts_after:
+        index = anchor.first_line
+        while index and defence_tag_of(file.lines[index - 1]) == "command":
+            index -= 1
+        return LineEdit(line_index=index, rank=EditRank.BEFORE, lines=lines)
+    index = anchor.end_line
+    while index < len(file.lines) and defence_tag_of(file.lines[index]) == OBSERVATION_TAG:
+        index += 1
+    return LineEdit(line_index=index, rank=EditRank.AFTER_PREVIOUS_LINE, lines=lines)
+
+
+def defence_edit(file: ParsedFile, anchor: ResolvedAnchor, code: str, tag: str) -> LineEdit:
+    """Return the edit that inserts a line of a defence at `anchor`, tagged with what it does."""
+    text = _encode(file, defence_line(code, tag), anchor.first_line)
+    return _insertion_of_lines(file, anchor, (anchor.indent + text + file.newline,))
+
+
+def defence_import_edit(file: ParsedFile, package: str | None) -> LineEdit:
+    line = defence_import_line(package).encode(file.encoding)
+    return LineEdit(
+        line_index=file.import_insertion_line_index, rank=EditRank.BEFORE, lines=(line + file.newline,)
     )
-    return LineEdit(line_index=index, rank=rank, lines=lines)
 
 
 def guard_edit(file: ParsedFile, anchor: ResolvedAnchor, code: Sequence[str], tag: str) -> LineEdit:

@@ -28,7 +28,7 @@ def anchor_and_one_line_texts(
     If the model needs the next statement, the anchor covers both. MutatorError if there is no such statement,
     or if its lines cannot be moved.
     """
-    anchored, following = _small_statements_by_line(file.data).get(anchor.first_line, (None, None))
+    anchored, following = _small_statements_by_line(file.target_data).get(anchor.first_line, (None, None))
     if anchored is None or anchor.first_line == anchor.end_line or not anchor.is_alone_on_line:
         raise _unfit_error(file, anchor, "the anchor is not at a statement that is alone on its lines")
     if isinstance(anchored, _BLOCK_ENDING_STATEMENTS):

@@ -23,6 +23,7 @@ STUB_PATH = Path("mutator") / "__init__.pyi"
 RENDER_BY_PAGE: dict[str, Callable[[Workspace], str]] = {
     "api.md": python_api.render_api_page,
     "campaign.md": yaml_format_pages.render_campaigns_page,
+    "defence.md": yaml_format_pages.render_defences_page,
     "family.md": yaml_format_pages.render_families_page,
     "channels.md": results_and_channels_pages.render_channels_page,
     "cluster-file.md": yaml_format_pages.render_clusters_page,

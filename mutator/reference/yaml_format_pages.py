@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from mutator._common.table_rendering import TextTable
 from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
+from mutator.defences import defence_yaml
 from mutator.execution.cluster import cluster_files
 from mutator.families import family_yaml
 from mutator.faults import fault_specs
@@ -26,6 +27,43 @@ _STRICT_YAML_LINKS = (
     "The YAML is as strict as in [fault specs](fault-spec.md), and "
     "[your editor can check it](../how-to/edit-with-completion.md)."
 )
+
+_DEFENCE_RULES = """\
+## When it acts
+
+In each step of a run, at the manifest's `actuation`, a defence reads its sensed values: ground truth of
+this step, or values of the controller, each with the delay and noise of the file. While `acts_when` has
+held for `acts_after_s`, it becomes active; while `lets_go_when` has held for `lets_go_after_s`, it ends.
+Changed commands reach the plant with the next step, so a defence is one step late.
+
+While active, its model gives ranges for commands, and each command is clamped to its range. With several
+defences, that of the highest `priority` comes last and decides. A defence *acts* in a step in which a
+command that reaches the plant differs from the controller's by more than the command's `tolerance` because
+of it. Several such steps in a row are one *activation*. Two defences are in *conflict* in a step in which
+their ranges for a command do not overlap.
+
+## The model
+
+A model uses only a few modules of the standard library, and no clock, file or shared random state. It is
+one class:
+
+```python
+class Model:
+    def __init__(self, *, deceleration): ...  # parameters of the defence, by name
+    def reset(self): ...  # at the start of a run, and whenever the defence lets go
+    def update(self, since_s, sensed, applied): ...
+```
+
+`update` is called in each step in which the defence is active. `since_s` is the time since it became
+active, `sensed` has the sensed and derived values, `applied` the commands that reached the plant in the
+step before. It returns the range of each command that it changes: `{"torque": (0.5, inf)}` is at least half,
+`(x, x)` exactly x.
+
+## In the tree
+
+A defended tree is the target's tree with the runtime `_fd.py`, a copy of each model, `_fd_<name>.py`, and
+lines with the tag `# fd:`. Places of faults are found in the target's own text, without these lines.
+"""
 
 
 def render_fault_spec_page(workspace: Workspace) -> str:
@@ -113,6 +151,19 @@ def _families_of_library(workspace: Workspace) -> Iterator[str]:
         rows += [("with", f"`{constraint}`") for constraint in family.constraints]
         yield TextTable(heads=("parameter", "values"), rows=rows).as_markdown(escape=False)
         yield ""
+
+
+def render_defences_page(workspace: Workspace) -> str:
+    return _join_page(
+        generated_page_head("Defences"),
+        "A defence acts against a hazard: it senses, and it changes the controller's commands on their way "
+        "to the plant.\nIts place in the library is `fault_library/defences/<name>.yaml`; its model is a "
+        "small Python file,\n`templates/defences/<model>.py`. The target's manifest says where commands can "
+        "be changed: [`actuation`](target-manifest.md#the-actuation).\n",
+        f"The first key is `schema: {defence_yaml.SCHEMA}`. {_STRICT_YAML_LINKS}\n",
+        *model_sections("defence.md", defence_yaml.DefenceModel),
+        _DEFENCE_RULES,
+    )
 
 
 def render_manifests_page(workspace: Workspace) -> str:

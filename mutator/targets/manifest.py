@@ -13,8 +13,10 @@ from mutator._common.hashing import digest
 from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metadata
 from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
+from mutator.targets.actuation import Actuation
 from mutator.targets.channels import Channel, Role
 from mutator.targets.command_placeholders import fill_placeholders
+from mutator.targets.defended_tree import DefendedTree
 from mutator.targets.hazard_and_metric_definitions import Hazard, Metric
 from mutator.targets.hazard_severity import DELTA_V_NAME, ContactSettings, SeveritySettings
 from mutator.targets.message_readers import MessageReader
@@ -118,6 +120,8 @@ class TargetManifest:
     speed: str = ""  # formula of the car's speed in m/s
     engaged: str = ""  # condition that holds while the controller drives
     sandbox: bool = False  # whether the target's code runs in a sandbox
+    actuation: Actuation | None = None  # where defences change commands
+    defended_tree: DefendedTree | None = None  # instead of the target's own tree
 
     @property
     def probe_package(self) -> str | None:
@@ -132,8 +136,15 @@ class TargetManifest:
         names = (*self.packages, *(path.partition("/")[0] for path in laid_over))
         return tuple(dict.fromkeys(name.removesuffix(".py") for name in names))
 
+    @property
+    def defences(self) -> tuple[str, ...]:
+        """The names of the defences in the tree."""
+        return self.defended_tree.defences if self.defended_tree else ()
+
     @cached_property
     def tree(self) -> SourceTree:
+        if self.defended_tree is not None:
+            return self.defended_tree.tree
         library = self.path.parent.parent
         tree = read_tree(
             self.root, self.file_globs, self.overlay, library=library, any_links=self.is_installed

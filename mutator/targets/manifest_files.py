@@ -9,6 +9,7 @@ from mutator._common.confined_files import checked_relative_path
 from mutator._common.shipped_files import SHIPPED_TARGET_ROOT
 from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
 from mutator.config.yaml_source_lines import YamlSource
+from mutator.targets.actuation_yaml import ActuationModel, build_actuation
 from mutator.targets.confined_relative_paths import clean_relative_path
 from mutator.targets.hazards_and_metrics_yaml import HazardModel, MetricModel, build_hazards, build_metrics
 from mutator.targets.manifest import FilmCommands, TargetManifest
@@ -106,6 +107,9 @@ class ManifestModel(StrictModel, title="The file"):
     )
     channels: dict[str, ChannelModel] = Field(description="The recorded channels and the role of each.")
     observation: ObservationModel = Field(description="Where the harness reads ground truth.")
+    actuation: ActuationModel | None = Field(
+        None, description="Where defences change commands. Without it, the target cannot be defended."
+    )
     hazards: list[str] | dict[str, HazardModel] = Field(
         description="What a run must avoid: names, and how to find each hazard in the trace; or a list of "
         "names in the record."
@@ -205,6 +209,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         channels=channels,
         record_file=model.record,
         observation=observation,
+        actuation=build_actuation(model.actuation, source),
         hazard_rules=rules,
         metrics=metrics,
         severity=build_severity(model.severity, rules, metrics, source) if model.severity else None,

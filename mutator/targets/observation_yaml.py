@@ -2,6 +2,7 @@
 
 import ast
 import keyword
+from collections.abc import Iterable, Mapping
 
 from pydantic import Field
 
@@ -10,8 +11,8 @@ from mutator.config.location_syntax import PROBE_MODULE_NAME, is_dotted_name
 from mutator.config.location_yaml import LocationModel
 from mutator.config.unit_symbol_field import UnitSymbol
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_source_lines import YamlSource
-from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS
+from mutator.config.yaml_source_lines import KeyPath, YamlSource
+from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, FaultLocation
 from mutator.targets.confined_relative_paths import clean_relative_path
 from mutator.targets.observed_values import Observation, ObservedValue
 from mutator.triggers.conditions import RESERVED_NAMES, TIME, canonical_formula
@@ -31,7 +32,7 @@ _ARGUMENT_COUNTS = {
 }  # other functions: one or more
 
 
-class _ValueModel(StrictModel, title="A value"):
+class ValueModel(StrictModel, title="A value"):
     is_: str = Field(
         alias="is",
         description="The derived value, as a formula over the values before it; or "
@@ -55,12 +56,12 @@ class ObservationModel(StrictModel, title="The observation"):
         "steps: the n-th observation is at (n - 1) times `step_s`, and a process cannot "
         "simulate a second run.",
     )
-    values: dict[str, _ValueModel] = Field(
+    values: dict[str, ValueModel] = Field(
         default_factory=dict,
         description="Name -> an expression at the place: names, attributes, items with constant keys, "
         "numbers, arithmetic, comparisons, and calls of `abs`, `min`, `max`, `hypot`, `float`, `len`.",
     )
-    derived: dict[str, _ValueModel] = Field(
+    derived: dict[str, ValueModel] = Field(
         default_factory=dict,
         description="Name -> a formula over the values before it. It may use arithmetic, `abs`, `min`, "
         "`max`, `hypot`, `inf`, and a choice, `a if b > 0 else c`. Division by 0 gives infinity "
@@ -69,21 +70,13 @@ class ObservationModel(StrictModel, title="The observation"):
 
 
 def build_observation(model: ObservationModel, source: YamlSource) -> Observation:
-    location = model.at.build_location(source, ("observation", "at"))
-    if location.anchor.kind in VALUE_ANCHORS | LOAD_TIME_ANCHORS:
-        raise source.error(
-            ("observation", "at", location.anchor.kind.value),
-            f"an observation at `{location.anchor.kind.value}`",
-            expected="a statement, such as `after_assign: gap`",
-        )
-    with source.locating_errors(("observation", "at", "file")):
-        clean_relative_path(location.path)
-    _check_value_names(model, source)
-    time = None if model.time is None else _checked_expression(model.time, source, ("observation", "time"))
+    location = checked_statement_location(model.at, source, ("observation", "at"))
+    check_value_names({"values": model.values, "derived": model.derived}, source, "observation")
+    time = None if model.time is None else checked_expression(model.time, source, ("observation", "time"))
     values = tuple(
         ObservedValue(
             name=name,
-            text=_checked_expression(value.is_, source, ("observation", "values", name, "is")),
+            text=checked_expression(value.is_, source, ("observation", "values", name, "is")),
             unit=value.unit,
             about=value.about,
         )
@@ -97,17 +90,34 @@ def build_observation(model: ObservationModel, source: YamlSource) -> Observatio
     )
 
 
-def _check_value_names(model: ObservationModel, source: YamlSource) -> None:
-    for key, names in (("values", model.values), ("derived", model.derived)):
+def checked_statement_location(model: LocationModel, source: YamlSource, keys: KeyPath) -> FaultLocation:
+    """Return the location of a statement, at which lines can be inserted; otherwise MutatorError."""
+    location = model.build_location(source, keys)
+    if location.anchor.kind in VALUE_ANCHORS | LOAD_TIME_ANCHORS:
+        raise source.error(
+            (*keys, location.anchor.kind.value),
+            f"an {keys[0]} at `{location.anchor.kind.value}`",
+            expected="a statement, such as `after_assign: gap`",
+        )
+    with source.locating_errors((*keys, "file")):
+        clean_relative_path(location.path)
+    return location
+
+
+def check_value_names(names_by_key: Mapping[str, Iterable[str]], source: YamlSource, section: str) -> None:
+    """Check that the names below the keys of a section are identifiers, unreserved and unique."""
+    used_names = set[str]()
+    for key, names in names_by_key.items():
         for name in names:
             good = name.isidentifier() and not keyword.iskeyword(name) and not name.startswith("_")
-            if not good or name in _RESERVED_NAMES or (key == "derived" and name in model.values):
+            if not good or name in _RESERVED_NAMES or name in used_names:
                 raise source.error(
-                    ("observation", key, name),
+                    (section, key, name),
                     f"'{name}'",
                     expected=f"a unique name of letters, digits and _, none of {', '.join(_RESERVED_NAMES)}",
                     remedy="rename it",
                 )
+            used_names.add(name)
 
 
 def _build_derived_values(
@@ -122,7 +132,8 @@ def _build_derived_values(
     return tuple(values)
 
 
-def _checked_expression(text: str, source: YamlSource, keys: tuple[str, ...]) -> str:
+def checked_expression(text: str, source: YamlSource, keys: KeyPath) -> str:
+    """Return the expression in canonical text; MutatorError at `keys` unless it only reads and computes."""
     try:
         return _canonical_expression(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError):

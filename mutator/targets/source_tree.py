@@ -14,6 +14,7 @@ from mutator._common.confined_files import checked_path_inside, checked_relative
 from mutator._common.files import check_path_encodable
 from mutator._common.hashing import canonical_json, digest
 from mutator.errors import MutatorError
+from mutator.targets.defence_lines import with_empty_defence_lines
 
 DerivedT = TypeVar("DerivedT")
 MOST_SOURCE_BYTES = 1_000_000  # bytes of a Python file
@@ -47,9 +48,15 @@ class SourceTree:
             self._derived_from_all[make] = make(self)
         return cast("DerivedT", self._derived_from_all[make])
 
-    def derive_once(self, path: str, make: Callable[[str, bytes, Path], DerivedT]) -> DerivedT:
+    def derive_once(
+        self,
+        path: str,
+        make: Callable[[str, bytes, Path], DerivedT],
+        *,
+        with_defence_lines: bool = False,
+    ) -> DerivedT:
         """Return `make(path, data, root)` for a file of the target, called once per path; `root` is the
-        file's folder.
+        file's folder. By default, the lines of defences are empty in `data`.
 
         MutatorError if the target has no file at `path`; errors of `make` pass through.
         """
@@ -63,7 +70,9 @@ class SourceTree:
                     remedy="correct the path, or add the file to the manifest's `files`",
                 )
             root = self.overlay if self.overlay and path in self.overlaid_paths else self.root
-            self._derived_by_file[key] = make(path, self.files[path], root)
+            data = self.files[path]
+            data = data if with_defence_lines else with_empty_defence_lines(data)
+            self._derived_by_file[key] = make(path, data, root)
         return cast("DerivedT", self._derived_by_file[key])
 
     def path_as_in_specs(self, path: str) -> str:
@@ -78,6 +87,18 @@ class SourceTree:
 
     def digest_with_changes(self, changed: Mapping[str, bytes]) -> str:
         return _tree_digest_of({**self._digest_inputs, **_digest_inputs_of(changed)})
+
+    def with_changes(self, changed: Mapping[str, bytes]) -> "SourceTree":
+        """Return the tree with these files, which replace its own or are new."""
+        inputs = {**self._digest_inputs, **_digest_inputs_of(changed)}
+        return SourceTree(
+            root=self.root,
+            files={**self.files, **changed},
+            digest=_tree_digest_of(inputs),
+            _digest_inputs=inputs,
+            overlay=self.overlay,
+            overlaid_paths=self.overlaid_paths,
+        )
 
 
 def _digest_inputs_of(files: Mapping[str, bytes]) -> dict[str, str]:

@@ -1,0 +1,1 @@
+"""What acts against a hazard: specs of defences, their models, and how they are arranged into sets."""

@@ -1,0 +1,128 @@
+"""Files of defences and their models are checked; each error names its place and a remedy."""
+
+import pytest
+
+from mutator.defences.defence import Kind, Role
+from mutator.errors import MutatorError
+from mutator.workspace import Workspace
+
+FILE = """\
+schema: defence/1
+name: d
+about: A defence.
+role: driver
+kind: monitor
+model: constant_command
+senses: {gap: {truth: d_rel}, read: {controller: gap_read, delay_s: 0.1}}
+derived: {error: {is: gap - read - offset, unit: m, about: difference}}
+parameters: {offset: {value: 1, unit: m}, lowest_brake: {value: 0.5, unit: "-"}}
+acts_when: abs(error) > 2
+commands: [brake]
+"""
+
+
+def load(toycar: Workspace, text: str = FILE) -> object:
+    (toycar.library / "defences" / "d.yaml").write_text(text)
+    return toycar.defended(toycar.manifest("toycar"), ["d"])
+
+
+def test_a_defence_has_what_its_file_says(toycar: Workspace) -> None:
+    """Without `lets_go_when`, it ends when `acts_when` does not hold; the model gets only its parameters."""
+    load(toycar)
+    defence = toycar.defence("d")
+    assert (defence.role, defence.kind, defence.priority) == (Role.DRIVER, Kind.MONITOR, 0.0)
+    assert defence.lets_go_when == "not abs(error) > 2.0"
+    assert defence.model_parameters == ("lowest_brake",)
+    assert toycar.defence("gas_limit").acts_when == "gap_read < 40.0"
+
+
+def test_the_digest_covers_file_and_model(toycar: Workspace) -> None:
+    load(toycar)
+    before = toycar.defence("d").digest
+    path = toycar.templates / "defences" / "constant_command.py"
+    path.write_text(path.read_text() + "\n")
+    assert toycar.defence("d").digest != before
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("role: driver\n", "", "'role' is missing"),
+        ("role: driver", "role: helper", "helper"),
+        ("name: d", "name: e", "'e'; expected 'd', the name of the file"),
+        ("model: constant_command", "model: nothing", "'nothing'; expected one of constant_command"),
+        ("truth: d_rel", "truth: d_rell", "'d_rell'; expected one of d_rel, v_ego, v_lead, hwt, rs"),
+        ("truth: d_rel", "truth: t", "'t'; expected one of d_rel"),
+        ("controller: gap_read", "controller: gap", "'gap'; expected one of gap_read, closing_read"),
+        ("truth: d_rel", "truth: d_rel, controller: gap_read", "both `truth` and `controller`"),
+        ("truth: d_rel", "noise: 1", "neither `truth` nor `controller`"),
+        ("abs(error) > 2", "abs(errors) > 2", "unknown name 'errors'"),
+        ("abs(error) > 2", "t > 2", "unknown name 't'"),
+        ("offset: {value", "gap: {value", "'gap'; expected a unique name"),
+        ("commands: [brake]", "commands: [horn]", "'horn'; expected one of gas, brake, wheel_turn"),
+        ("commands: [brake]", "commands: []", "commands"),
+        ("value: 0.5", "value: .nan", "nan"),
+    ],
+)
+def test_a_mistake_in_the_file_is_refused(toycar: Workspace, old: str, new: str, message: str) -> None:
+    with pytest.raises(MutatorError, match=r"d\.yaml:\d+: .*" + message.replace("(", r"\(")):
+        load(toycar, FILE.replace(old, new))
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("class Model:\n    def reset(self): ...\n", r"no method `update\(self, since_s, sensed, applied\)`"),
+        ("import os\n", "an import of os"),
+        ("from . import x\n", "an import of ."),
+        ("x = open('a')\n", "the name `open`"),
+        ("x = 1\n", "0 classes `Model`"),
+        ("x = (\n", "not valid Python"),
+    ],
+)
+def test_a_file_that_is_no_model_is_refused(toycar: Workspace, code: str, message: str) -> None:
+    (toycar.templates / "defences" / "own.py").write_text(code)
+    with pytest.raises(MutatorError, match=rf"own\.py.*{message}"):
+        load(toycar, FILE.replace("constant_command", "own"))
+
+
+def test_a_missing_parameter_of_the_model_is_named(toycar: Workspace) -> None:
+    code = "class Model:\n    def __init__(self, *, amount, more=1.0): ...\n    def reset(self): ...\n"
+    code += "    def update(self, since_s, sensed, applied): ...\n"
+    (toycar.templates / "defences" / "own.py").write_text(code)
+    with pytest.raises(MutatorError, match=r"no parameter 'amount'; expected .* amount, more"):
+        load(toycar, FILE.replace("constant_command", "own"))
+
+
+def test_a_target_without_actuation_cannot_be_defended(toycar: Workspace) -> None:
+    path = toycar.library / "targets" / "toycar.yaml"
+    text = path.read_text()
+    path.write_text(text[: text.index("actuation:")] + text[text.index("hazards: [") :])
+    with pytest.raises(MutatorError, match="target toycar cannot be defended; expected `actuation`"):
+        load(toycar)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("is: wheel,", "is: wheels,", "'wheels' is not known in Driver.drive"),
+        ("is: wheel,", "is: abs(wheel),", "a name, an attribute or an item"),
+        ("lowest: -1", "lowest: 2", "2; expected less than `highest`, 1"),
+        ("gap_read: {is: gap", "gas: {is: gap", "'gas'; expected a unique name"),
+        ('before_return: ""', 'return_value: ""', "an actuation at `return_value`"),
+    ],
+)
+def test_a_mistake_in_the_actuation_is_refused(toycar: Workspace, old: str, new: str, message: str) -> None:
+    path = toycar.library / "targets" / "toycar.yaml"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(MutatorError, match=rf"toycar\.yaml:\d+: .*{message}"):
+        load(toycar)
+
+
+def test_a_tree_that_looks_defended_is_refused(toycar: Workspace) -> None:
+    """Lines with the tag would be taken for those of defences."""
+    path = toycar.manifest("toycar").root / "toycar" / "haze.py"
+    path.write_text(path.read_text() + "\nx = 1  # fd:import\n")
+    with pytest.raises(MutatorError, match=r"haze\.py:\d+: the line ends in a `# fd:` tag"):
+        load(toycar)
