@@ -206,7 +206,7 @@ class CampaignModel(StrictModel, title="The file"):
     sample: int | None = Field(
         None,
         ge=1,
-        description="How many experiments to take, balanced over the variants. Default: all.",
+        description="How many experiments to take, each variant equally often. Default: all.",
     )
     proportional: bool = Field(
         False,

@@ -1,11 +1,12 @@
 """A plan: the frozen, ordered list of a campaign's experiments, and the expected cost of running them."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from html import escape
 from itertools import chain
+from operator import add
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,20 +17,20 @@ from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.campaigns.campaign_expansion import CampaignExpansion
 from mutator.campaigns.campaign_files import Campaign, check_expectation, check_readings, load_campaign
 from mutator.campaigns.chunks import chunk_lengths_of_runs
+from mutator.campaigns.experiment_choice import ExperimentChoice
 from mutator.campaigns.fault_free_drives import FaultFreeDrive, check_choices_without_faults, drives_of_run
 from mutator.campaigns.neutral_faults import NeutralFaultWarner
 from mutator.campaigns.plan_tally import FaultTypeAndMethod, PlanPart, PlanTally, plan_digest
-from mutator.campaigns.row_filters import matching_items
-from mutator.campaigns.sampling import draw_balanced, draw_balanced_pairs, draw_in_proportion
 from mutator.campaigns.shared_runs import group_by_run, order_for_sharing
 from mutator.errors import MutatorError
 from mutator.families.family_facts import FamilyFacts
 from mutator.limits import MeasuredLimits
 from mutator.model import AfterHazard, Experiment
-from mutator.results.plan_columns import columns_of_plan, plan_column_names, plan_row
+from mutator.results.plan_columns import columns_of_plan, plan_row
 from mutator.store import plan_file
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_choices import Choices
+from mutator.store.plan_strata import PlanStrata, load_strata
 from mutator.store.preflight_results import mean_golden_run_cpu_s
 from mutator.store.run_folder import RunFolder
 from mutator.store.shards import Shard
@@ -80,6 +81,7 @@ class Plan:
     operator_notes: tuple[str, ...] = ()  #: how many mutants the operators produced, and what was left out
     drives: tuple[FaultFreeDrive, ...] = ()  #: the runs of a campaign without faults
     families: tuple[FamilyFacts, ...] = ()  #: the families that gave scenarios
+    strata: PlanStrata | None = None  #: of the plan from which the experiments were drawn; None: not drawn
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")
@@ -106,7 +108,12 @@ class Plan:
 
     def parts(self) -> Iterator[PlanPart]:
         """Yield the plan as one part."""
-        yield PlanPart(experiments=self.experiments, chunk_lengths=self.chunks, run_count=self.runs)
+        yield PlanPart(
+            experiments=self.experiments,
+            chunk_lengths=self.chunks,
+            run_count=self.runs,
+            strata=self.strata,
+        )
 
     def _repr_html_(self) -> str:
         groups = sorted(self.groups().items())
@@ -251,39 +258,14 @@ class SeedBySeedPlan:
 
     def _build_part(self, seed: int, most_experiments: int | None) -> PlanPart:
         experiments = self._expansion.with_seed(seed).build_experiments()
-        runs_in_order = order_for_sharing(
-            group_by_run(
-                self._manifest,
-                self._choose_experiments(experiments, seed, most_experiments),
-            )
-        )
+        choice = ExperimentChoice(campaign=self.campaign, choices=self.choices, families=self.families)
+        chosen = choice.choose(experiments, seed, most_experiments)
+        runs_in_order = order_for_sharing(group_by_run(self._manifest, chosen))
         return PlanPart(
             experiments=tuple(experiment for same in runs_in_order for experiment in same),
             chunk_lengths=chunk_lengths_of_runs(runs_in_order, self.campaign.chunk_size),
             run_count=len(runs_in_order),
-        )
-
-    def _choose_experiments(
-        self, experiments: tuple[Experiment, ...], seed: int, most_experiments: int | None
-    ) -> tuple[Experiment, ...]:
-        if self.campaign.sample_size is not None:
-            experiments = _sample_experiments(experiments, self.campaign, self.campaign.sample_size, seed)
-        columns = columns_of_plan(self.families)
-        for text, selects in ((self.choices.only, True), (self.choices.exclude, False)):
-            if text is not None:
-                experiments = tuple(
-                    matching_items(
-                        experiments,
-                        text,
-                        plan_column_names(self.families),
-                        lambda experiment: plan_row(experiment, columns),
-                        keeps_matches=selects,
-                    )
-                )
-        return (
-            experiments
-            if most_experiments is None
-            else draw_balanced_pairs(experiments, most_experiments, seed)
+            strata=choice.strata_before_draw(experiments, chosen),
         )
 
     def _check_shards(self, chunk_count: int) -> None:
@@ -327,20 +309,13 @@ def build_plan(workspace: Workspace, campaign: str | Path, choices: Choices | No
         cpu_limit_s=None if "cpu_s" in loaded.measured_limit_names else loaded.limits.cpu_s,
         operator_notes=planning.operator_notes,
         families=planning.families,
+        strata=_sum_strata(part.strata for part in parts),
     )
 
 
-def _sample_experiments(
-    experiments: tuple[Experiment, ...], campaign: Campaign, count: int, seed: int
-) -> tuple[Experiment, ...]:
-    if not campaign.is_sample_proportional:
-        return draw_balanced(experiments, count, seed)
-    try:
-        return draw_in_proportion(experiments, count, seed)
-    except ValueError as err:
-        raise campaign.error(
-            ("sample",), f"sample {count}", expected=str(err), remedy="correct the number"
-        ) from None
+def _sum_strata(strata: Iterable[PlanStrata | None]) -> PlanStrata | None:
+    drawn = [each for each in strata if each]
+    return reduce(add, drawn) if drawn else None
 
 
 def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
@@ -369,6 +344,7 @@ def load_plan(folder: RunFolder, tally: PlanTally | None = None) -> Plan:
         operator_notes=head.operators,
         drives=drives_of_run(folder) if campaign.is_fault_free else (),
         families=head.families,
+        strata=load_strata(folder.path),
     )
     if tally is not None:
         vars(plan)["tally"] = tally  # set the cached property; computing it would read every experiment

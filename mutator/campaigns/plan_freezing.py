@@ -29,6 +29,7 @@ from mutator.results.plan_columns import PlanColumn, columns_of_plan
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
 from mutator.store.plain_contents_check import check_plain_contents
+from mutator.store.plan_strata import STRATA_FILE
 from mutator.store.planned_scenarios import SCENARIOS_FILE, scenario_lines
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RUN_SCHEMA, Provenance, RunHead
@@ -172,6 +173,10 @@ def _write_plan_files(
         content = scenario_lines(scenarios)
         write_atomic(out / SCENARIOS_FILE, content)
         files[SCENARIOS_FILE] = FileDigest.of_bytes(content)
+    if tally.strata:
+        content = tally.strata.file_bytes()
+        write_atomic(out / STRATA_FILE, content)
+        files[STRATA_FILE] = FileDigest.of_bytes(content)
     return tally, plan_digest, writer.chunks, files
 
 

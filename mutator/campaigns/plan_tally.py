@@ -10,6 +10,7 @@ from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.fault_free_drives import FaultFreeDrive
 from mutator.model import ConcreteScenario, Experiment, Fault
 from mutator.store.golden_runs import GoldenRun
+from mutator.store.plan_strata import PlanStrata
 from mutator.store.planned_scenarios import PlannedScenario
 
 # The start of every plan digest. Publications cite digests, so this text must never change.
@@ -27,6 +28,7 @@ class PlanPart:
     experiments: Sequence[Experiment]
     chunk_lengths: Sequence[int]
     run_count: int
+    strata: PlanStrata | None = None  # of the plan from which the experiments were drawn, if they were
 
 
 @dataclass(slots=True, kw_only=True)
@@ -43,6 +45,7 @@ class PlanTally:
     goldens_without_canary: dict[GoldenRun, None] = field(default_factory=dict)
     example_fault_by_variant: dict[str, Fault] = field(default_factory=dict)  # one fault per variant
     concrete_by_name: dict[str, ConcreteScenario] = field(default_factory=dict)  # scenarios of families
+    strata: PlanStrata | None = None
 
     def __post_init__(self) -> None:
         for drive in self.drives:
@@ -54,6 +57,8 @@ class PlanTally:
         self.experiment_count += len(part.experiments)
         self.run_count += part.run_count
         self.chunk_lengths += part.chunk_lengths
+        if part.strata:
+            self.strata = self.strata + part.strata if self.strata else part.strata
         for experiment in part.experiments:
             fault = experiment.fault
             self.count_by_type_and_method[fault.module, fault.fault_type, experiment.method.value] += 1

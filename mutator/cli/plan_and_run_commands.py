@@ -28,6 +28,7 @@ from mutator.cli.shared_options import (
     Limit,
     Only,
     OutRunFolder,
+    Proportional,
     Reading,
     Seed,
     SeriesMb,
@@ -83,6 +84,7 @@ def plan(
     only: Only = None,
     exclude: Exclude = None,
     limit: Limit = None,
+    proportional: Proportional = False,
     seed: Seed = None,
     reading: Reading = None,
     wide: Wide = False,
@@ -98,7 +100,9 @@ def plan(
 
     terminal = Terminal(as_json, wide)
     workspace = workspace_options.workspace()
-    choices = mutator.Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit)
+    choices = mutator.Choices(
+        seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, proportional=proportional
+    )
     with terminal.show_spinner("planning"):
         new_plan = mutator.plan(campaign, out, choices=choices, workspace=workspace)
     folder = out.resolve()
@@ -138,6 +142,7 @@ def run(
     only: Only = None,
     exclude: Exclude = None,
     limit: Limit = None,
+    proportional: Proportional = False,
     seed: Seed = None,
     reading: Reading = None,
     shard: Shard = None,
@@ -192,7 +197,13 @@ def run(
     step = GitHubStep.of_environment() if github else None
     workspace = workspace_options.workspace()
     choices = mutator.Choices(
-        seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, shard=shard
+        seed=seed,
+        reading=reading,
+        only=only,
+        exclude=exclude,
+        limit=limit,
+        proportional=proportional,
+        shard=shard,
     )
     choices = replace(choices, series_mb=series_mb)
     workers = usable_cores() if workers is None else workers

@@ -76,8 +76,16 @@ Limit = Annotated[
     int | None,
     typer.Option(
         min=1,
-        help="At most this many experiments, spread over the plan. Guided and random experiments stay in "
-        "pairs.",
+        help="At most this many experiments, for a quick look: each variant equally often, guided and random "
+        "ones in pairs.",
+    ),
+]
+Proportional = Annotated[
+    bool,
+    typer.Option(
+        "--proportional",
+        help="With --limit: keep each fault type in each scenario in proportion to its number of experiments "
+        "(at least one pair), so that rates estimate those of the whole plan.",
     ),
 ]
 Shard = Annotated[

@@ -19,6 +19,7 @@ from mutator.cli.shared_options import (
     Exclude,
     Limit,
     Only,
+    Proportional,
     Reading,
     Seed,
     WorkspaceOptions,
@@ -63,6 +64,7 @@ def watch(
     only: Only = None,
     exclude: Exclude = None,
     limit: Limit = None,
+    proportional: Proportional = False,
     seed: Seed = None,
     reading: Reading = None,
     engine: Engine = None,
@@ -84,7 +86,9 @@ def watch(
             campaign,
             folder,
             _Display(terminal, folder, stack),
-            choices=mutator.Choices(seed=seed, reading=reading, only=only, exclude=exclude, limit=limit),
+            choices=mutator.Choices(
+                seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, proportional=proportional
+            ),
             workers=usable_cores() if workers is None else workers,
             engine=engine,
         )

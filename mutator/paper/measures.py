@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING
 
 from mutator._common.message_text import counted
 from mutator.statistics import event_time_statistics, guided_against_random
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL, Share
-from mutator.statistics.shares_with_intervals import share_with_interval as wilson
 from mutator.statistics.tallies import tally_by_fault_type
+from mutator.statistics.weighted_shares import share_of_runs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,7 +58,7 @@ class Estimate:
 
 
 def share(runs: "pd.DataFrame", *, of: str, part: str) -> Estimate:
-    """Return the share of runs in `of` that are also in `part`, with Wilson's interval."""
+    """Return the share of runs in `of` that are also in `part`, with its interval; of a sample, weighted."""
     return estimate_of_share(_measure_share(runs, of, part))
 
 
@@ -191,11 +192,17 @@ def estimate_of_share(share: Share) -> Estimate:
 
 
 def estimate_of_difference(first: Share, second: Share) -> Estimate:
-    """Return the first share minus the second, for separate sets of runs (Newcombe, statsmodels)."""
+    """Return the first share minus the second, for separate sets of runs (Newcombe, statsmodels). Weighted
+    shares are combined in the same way, from their own intervals.
+    """
     from statsmodels.stats.proportion import confint_proportions_2indep
 
     low = high = math.nan
-    if first.of and second.of:
+    if first.weighted_rate is not None or second.weighted_rate is not None:
+        change = first.rate - second.rate
+        low = change - math.hypot(first.rate - first.low, second.high - second.rate)
+        high = change + math.hypot(first.high - first.rate, second.rate - second.low)
+    elif first.of and second.of:
         low, high = confint_proportions_2indep(
             first.count,
             first.of,
@@ -215,9 +222,13 @@ def _select_runs(runs: "pd.DataFrame", query: str) -> "pd.DataFrame":
 
 
 def _measure_share(runs: "pd.DataFrame", of: str, part: str) -> Share:
-    query_words = {*re.findall(r"\w+", f"{of} {part}")}  # selecting rows is slow with all columns
+    import pandas as pd
+
+    query_words = {*re.findall(r"\w+", f"{of} {part}"), "fault_id", WEIGHT_COLUMN}
+    # selecting rows is slow with all columns
     selected_runs = _select_runs(runs[[name for name in runs.columns if name in query_words]], of)
-    return wilson(len(_select_runs(selected_runs, part)), len(selected_runs))
+    is_in_part = selected_runs.index.isin(_select_runs(selected_runs, part).index)
+    return share_of_runs(selected_runs, pd.Series(is_in_part), pd.Series(True, index=selected_runs.index))
 
 
 def _describe_difference(

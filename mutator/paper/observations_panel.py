@@ -129,6 +129,8 @@ def _missing_fault_types(fault_types: Sequence[str], runs: "pd.DataFrame") -> li
 
 def _differences_from_papers_mixture(run: ReportedRun, missing_fault_types: list[str]) -> Iterator[str]:
     """Yield how the run differs from the paper's mixture of faults. A shard is always incomplete."""
+    if (sample := run.sampled_plan) and sample.is_even:
+        yield "the experiments are an even sample"
     if missing_fault_types:
         yield f"no runs of {counted(len(missing_fault_types), 'fault type')} of the paper"
     if run.ran_count < (planned := run.folder.head.experiments):

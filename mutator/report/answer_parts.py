@@ -83,10 +83,13 @@ def filtered_list_fragment(filters: Mapping[str, Sequence[str]], sort: str = "")
     return "&".join((*parts, *([f"sort={sort}"] if sort else ())))
 
 
-def describe_share(part: int, whole: int, plural_noun: str) -> str:
-    """Return a share as text, for example `20 of 96 activated faults (21 %)`."""
+def describe_share(part: int, whole: int, plural_noun: str, *, is_sample: bool = False) -> str:
+    """Return a share as text, for example `20 of 96 activated faults (21 %)`; of a sample only the counts,
+    because they have no rate of all.
+    """
     noun = plural_noun.removesuffix("s") if whole == 1 else plural_noun
-    return f"{part:,} of {whole:,} {noun}" + (f" ({100 * part / whole:.0f} %)" if whole else "")
+    percent = f" ({100 * part / whole:.0f} %)" if whole and not is_sample else ""
+    return f"{part:,} of {whole:,} {noun}{percent}"
 
 
 def was_or_were(count: int) -> str:

@@ -2,23 +2,20 @@
 against the run before.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isnan
 from typing import TYPE_CHECKING
 
 from mutator._common.message_text import counted
-from mutator.config.yaml_files import load_yaml
-from mutator.errors import MutatorError
 from mutator.model import Record
 from mutator.report.answer_parts import ALERT_BEFORE_HAZARD, SILENT_HAZARD_WARNINGS, filtered_list_fragment
 from mutator.report.reported_run import ReportedRun
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, rows_of
 from mutator.statistics.bootstrap_median_intervals import median_interval
-from mutator.statistics.shares_with_intervals import share_with_interval
-from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import CAMPAIGN_FILE
+from mutator.statistics.weighted_shares import share_of_runs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,42 +58,48 @@ def key_numbers(frame: "pd.DataFrame", *, has_alerts: bool) -> tuple[KeyNumber, 
     soon the hazard came. `frame` has the usable experiments, with their `warning`. A target without alerts
     has the share of faults that changed an actuator instead of silent hazards.
     """
-    active, hazards = frame[frame["is_activated"]], frame[frame["outcome"] == "hazard"]
-    silent = hazards[hazards["warning"] != ALERT_BEFORE_HAZARD]
+    every, active, hazard = frame["is_activated"] | True, frame["is_activated"], frame["outcome"] == "hazard"
+    silent = hazard & (frame["warning"] != ALERT_BEFORE_HAZARD)
+    share = partial(_share_number, frame)
     numbers = [
-        _share_number(active, frame, "faults", "acted (activated)", {}, "t_activation>=0"),
-        _share_number(hazards, active, "activated faults", "led to a hazard", {"outcome": ["hazard"]}),
+        share(active, every, "faults", "acted (activated)", query="t_activation>=0"),
+        share(hazard, active, "activated faults", "led to a hazard", filters={"outcome": ["hazard"]}),
     ]
     if has_alerts:
         filters = {"warning": SILENT_HAZARD_WARNINGS}
-        numbers.append(_share_number(silent, hazards, "hazards", "came without an alert before", filters))
+        numbers.append(share(silent, hazard, "hazards", "came without an alert before", filters=filters))
     else:
-        manifested = active[active["is_manifested"]]
-        query = "t_manifest>=0"
-        numbers.append(
-            _share_number(manifested, active, "activated faults", "changed an actuator", {}, query)
-        )
-    return (*numbers, _time_number(hazards))
+        manifested = active & frame["is_manifested"]
+        verb, query = "changed an actuator", "t_manifest>=0"
+        numbers.append(share(manifested, active, "activated faults", verb, query=query))
+    return (*numbers, _time_number(frame[hazard]))
 
 
 def _share_number(
-    part: "pd.DataFrame",
-    whole: "pd.DataFrame",
+    frame: "pd.DataFrame",
+    part: "pd.Series",
+    whole: "pd.Series",
     plural_noun: str,
     verb: str,
-    filters: Mapping[str, tuple[str, ...] | list[str]],
+    *,
+    filters: Mapping[str, Sequence[str]] | None = None,
     query: str = "",
 ) -> KeyNumber:
-    result = share_with_interval(len(part), len(whole))
+    result = share_of_runs(frame, part, whole)
     meaning = f"of the {plural_noun} {verb}"
     if not result.of:
         return KeyNumber(value="-", meaning=meaning, evidence=f"there were no {plural_noun}", fragment="")
+    fragment = filtered_list_fragment(filters or {"q": [query]}) if result.count else ""
+    counts = f"{result.count:,} of {result.of:,}"
+    if isnan(result.rate):
+        return KeyNumber(value=counts, meaning=meaning, evidence="drawn; no rate of all", fragment=fragment)
     rate, low, high = (100 * value for value in (result.rate, result.low, result.high))
+    drawn = "" if result.weighted_rate is None else " drawn; weighted"
     return KeyNumber(
         value=f"{rate:.0f} %",
         meaning=meaning,
-        evidence=f"{result.count:,} of {result.of:,}; 95 % interval {low:.0f} to {high:.0f} %",
-        fragment=filtered_list_fragment(filters or {"q": [query]}) if result.count else "",
+        evidence=f"{counts}{drawn}; 95 % interval {low:.0f} to {high:.0f} %",
+        fragment=fragment,
         percents=(rate, low, high),
     )
 
@@ -116,29 +119,6 @@ def _time_number(hazards: "pd.DataFrame") -> KeyNumber:
         evidence=f"{interval}; {times.min():.2f} s at the soonest",
         fragment=filtered_list_fragment({"outcome": ["hazard"]}, "time_to_hazard"),
     )
-
-
-def sample_note(folder: RunFolder) -> str:
-    """Return what the shares are shares of, if the experiments are an even sample; '' otherwise. Such a
-    sample takes each variant equally often, so it has no rate of all experiments of the campaign.
-    """
-    limit = folder.head.choices.limit
-    if (limit is None or folder.head.experiments < limit) and not _has_even_sample(folder):
-        return ""
-    return (
-        "The experiments are an even sample, which takes each variant equally often. The shares are those of "
-        "this mixture, not of all experiments that the campaign describes."
-    )
-
-
-def _has_even_sample(folder: RunFolder) -> bool:
-    try:
-        campaign = load_yaml(folder.path / CAMPAIGN_FILE).data
-    except MutatorError:
-        return False
-    if not isinstance(campaign, dict) or campaign.get("sample") is None:
-        return False
-    return not campaign.get("proportional")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

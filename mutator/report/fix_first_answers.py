@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ from mutator.report.answer_parts import (
 )
 from mutator.report.fault_path_page_data import RunFaultPaths, link_name
 from mutator.report.most_dangerous_experiments_answer import NO_CLASS_VALUE, SEVERITY_COLUMN
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -110,7 +112,8 @@ def _rule_paragraph(
     plural_noun: str,
 ) -> str:
     is_first_type = counted_hazards["kind"] == order[0]
-    first_share = describe_share(int(is_first_type.sum()), len(counted_hazards), plural_noun)
+    share_text = partial(describe_share, is_sample=WEIGHT_COLUMN in counted_hazards)
+    first_share = share_text(int(is_first_type.sum()), len(counted_hazards), plural_noun)
     paragraph = f"Start with {order[0]}: {first_share}"
     if classes[0]:
         of_class = counted_hazards[SEVERITY_COLUMN] == classes[0]

@@ -1,6 +1,7 @@
 """The most dangerous results: the worst experiments, and the fault types with the most hazards."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ from mutator.report.answer_parts import (
     share_bar,
 )
 from mutator.results.worst_first_ranking import causes_of, worst_of_each_cause
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.targets.stored_target_facts import MetricFacts
 
 if TYPE_CHECKING:
@@ -39,14 +41,15 @@ def most_dangerous_answer(
     has_alerts: bool,
 ) -> ReportAnswer:
     active = frame[frame["is_activated"]]
+    share_text = partial(describe_share, is_sample=WEIGHT_COLUMN in frame)
     ranked = frame[frame["outcome"] == "hazard"].sort_values("place")
     contact_column = find_contact_column(frame)
-    paragraph = f"{describe_share(len(ranked), len(active), 'activated faults')} led to a hazard."
+    paragraph = f"{share_text(len(ranked), len(active), 'activated faults')} led to a hazard."
     if SEVERITY_COLUMN in frame and len(ranked):
         paragraph = f"{paragraph.removesuffix('.')}: {_describe_severities(ranked, severity_labels)}."
     elif contact_column:
         hits = int((ranked[contact_column] > 0).sum())
-        paragraph += f" {describe_share(hits, len(ranked), 'hazards')} involved contact."
+        paragraph += f" {share_text(hits, len(ranked), 'hazards')} involved contact."
     units = {metric.name: metric.unit for metric in metrics}
     kinds = fault_type_counts(ranked, active)
     with_hazards = [kind for kind in kinds if kind[1]]

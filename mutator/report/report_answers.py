@@ -1,5 +1,6 @@
 """Answers to a reader's first questions. Each answer links to its experiments in the list."""
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.message_text import counted
@@ -28,6 +29,7 @@ from mutator.report.most_dangerous_experiments_answer import most_dangerous_answ
 from mutator.report.reported_run import ReportedRun
 from mutator.results.experiment_sentence import ExperimentSentences
 from mutator.results.result_rows import ResultRow, rows_of
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -90,10 +92,11 @@ def _describe_first_alert(row: ResultRow) -> str:
 def silent_hazards_answer(frame: "pd.DataFrame", alerts_caveat: str = "") -> ReportAnswer:
     """Say which hazards were silent. `alerts_caveat` is about alerts that were not observed."""
     hazards = frame[frame["outcome"] == "hazard"]
+    share_text = partial(describe_share, is_sample=WEIGHT_COLUMN in frame)
     silent = hazards[hazards["warning"] != ALERT_BEFORE_HAZARD]
     never, late = (int((silent["warning"] == name).sum()) for name in (NO_ALERT, ALERT_AFTER_HAZARD))
     paragraph = (
-        f"{describe_share(len(silent), len(hazards), 'hazards')} {was_or_were(len(silent))} silent (no alert "
+        f"{share_text(len(silent), len(hazards), 'hazards')} {was_or_were(len(silent))} silent (no alert "
     )
     paragraph += "before the hazard)"
     paragraph += (
@@ -146,10 +149,11 @@ def _describe_truncation(count: int, plural_noun: str) -> str:
 def tolerated_faults_answer(frame: "pd.DataFrame") -> ReportAnswer:
     """Say how many activated faults led to no hazard, and which fault types never led to one."""
     active = frame[frame["is_activated"]]
+    share_text = partial(describe_share, is_sample=WEIGHT_COLUMN in frame)
     without_hazard = active[active["outcome"].isin(["masked", "sdc"])]
     actuator_changes = int(without_hazard["is_manifested"].sum())
     unfinished = len(active) - len(without_hazard) - int((active["outcome"] == "hazard").sum())
-    paragraph = f"{describe_share(len(without_hazard), len(active), 'activated faults')} led to no hazard: "
+    paragraph = f"{share_text(len(without_hazard), len(active), 'activated faults')} led to no hazard: "
     masked = len(without_hazard) - actuator_changes
     paragraph += f"{masked:,} changed no actuator (masked), {actuator_changes:,} did (sdc)."
     paragraph += f" {unfinished:,} crashed or timed out." if unfinished else ""

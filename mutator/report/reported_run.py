@@ -23,6 +23,7 @@ from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import Results
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.results_frame import prepare_results
+from mutator.statistics.sample_weights import SampledPlan, sampled_plan, with_weights
 from mutator.store import plan_file
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import RunFolder
@@ -69,10 +70,16 @@ class ReportedRun:
             folder=folder,
             workspace=workspace,
             results=results,
-            frame=prepare_results(
-                results.assign(
-                    **{RANK_COLUMN: facts.worst_first_ranks, UNTIMED_PATH_COLUMN: facts.untimed_path_indices}
-                )
+            frame=with_weights(
+                prepare_results(
+                    results.assign(
+                        **{
+                            RANK_COLUMN: facts.worst_first_ranks,
+                            UNTIMED_PATH_COLUMN: facts.untimed_path_indices,
+                        }
+                    )
+                ),
+                folder.path,
             ),
             engine_summary=summarize_engines(folder, records, facts.timings),
             published_work=_find_published_work(folder) if workspace else None,
@@ -93,6 +100,11 @@ class ReportedRun:
     def rows(self) -> tuple[ResultRow, ...]:
         """The results as objects. For large runs use `results` or `frame`."""
         return tuple(rows_of(self.results, self.faults))
+
+    @property
+    def sampled_plan(self) -> SampledPlan | None:
+        """What the experiments were drawn from; None if they are no sample."""
+        return sampled_plan(self.frame, self.folder.path)
 
     @property
     def ran_count(self) -> int:

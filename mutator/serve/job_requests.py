@@ -89,6 +89,7 @@ class CampaignRequest(StrictModel):
     campaign: PlainText
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
     limit: Annotated[int, Field(ge=1, le=1000)] = 20
+    proportional: bool = False
     only: PlainText | None = None
     seed: Seed | None = None
     workers: Annotated[int, Field(ge=1)] | None = None
@@ -242,7 +243,11 @@ class RequestChecker:
         return JobCommand(
             job_request=request,
             title=f"{request.campaign} into {request.name}",
-            argv=("run", request.campaign, *_joined_options(options), *self._workspace_options()),
+            argv=(
+                *("run", request.campaign, *_joined_options(options)),
+                *(("--proportional",) if request.proportional else ()),
+                *self._workspace_options(),
+            ),
             run_folder=folder,
             requesting_page=live_page_name(folder),
         )

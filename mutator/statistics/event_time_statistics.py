@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mutator.statistics.results_frame import hazard_names
-from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL, Share, share_with_interval
+from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL, Share
+from mutator.statistics.weighted_shares import share_of_runs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,8 +84,8 @@ def share_of_hazards_within(frame: "pd.DataFrame", time_s: float) -> Share:
     """Return the share, among the runs with a hazard after the activation, of those whose first hazard came
     no later than `time_s` after it.
     """
-    times = frame["time_to_hazard"].dropna()
-    return share_with_interval(int((times.round(6) <= time_s).sum()), len(times))
+    times = frame["time_to_hazard"]
+    return share_of_runs(frame, times.round(6) <= time_s, times.notna())
 
 
 def propagation_spreads_by_step(frame: "pd.DataFrame") -> dict[str, TimeSpread]:
@@ -123,7 +124,7 @@ def alert_to_hazard_times(
         "hazards_after_alert": events,
         "runs_alerted_too_late": len(alerted) - len(first),
     }
-    late_hazards = share_with_interval(int((late & first["is_hazard"]).sum()), events)
+    late_hazards = share_of_runs(first, late, first["is_hazard"])
     if not events:
         nan = math.nan
         no_hazard_share = 1.0 if len(first) else nan
@@ -177,6 +178,8 @@ def alert_first_share_by_hazard_and_alert(
 
     `alerts_by_experiment` has the name and first time (s) of each alert of a run with a hazard.
     """
+    import pandas as pd
+
     shares: dict[tuple[str, str], Share] = {}
     for hazard in hazard_names(frame):
         ends = frame[f"t_{hazard.lower()}"].dropna()
@@ -185,12 +188,17 @@ def alert_first_share_by_hazard_and_alert(
             {name for name, t in first_alerts_by_hazard_run[run] if t < end}
             for run, end in zip(runs, ends, strict=True)
         ]
-        counts = Counter(name for names in before for name in names)
-        warned = sum(bool(names) for names in before)
+        names_before = pd.Series(before, index=ends.index, dtype=object)
         if before:
-            run_counts = {**dict(sorted(counts.items())), "any": warned, "none": len(before) - warned}
+            by_name = {
+                name: names_before.map(lambda names, name=name: name in names).astype(bool)
+                for name in sorted(set().union(*before))
+            }
+            by_name["any"] = names_before.map(bool).astype(bool)
+            by_name["none"] = ~by_name["any"]
+            rows = frame.loc[ends.index]
             shares |= {
-                (hazard, name): share_with_interval(count, len(before)) for name, count in run_counts.items()
+                (hazard, name): share_of_runs(rows, flags, flags | True) for name, flags in by_name.items()
             }
     return shares
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from mutator.statistics.paired_statistics import PairCounts, resampled_interval
 from mutator.statistics.paired_statistics import mcnemar_test as exact_mcnemar
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.shares_with_intervals import CONFIDENCE_LEVEL
 from mutator.statistics.tallies import Tally
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 RateBase = Literal["activated", "injected"]
 RATE_BASES: tuple[RateBase, ...] = ("activated", "injected")
-GUIDED, RANDOM = "guided", "random"
+METHODS = GUIDED, RANDOM = "guided", "random"
 _PAIR_KEY_COLUMNS = ["fault_id", "scenario", "row", "seed"]
 
 
@@ -168,12 +169,13 @@ def resampled_rate_difference(frame: "pd.DataFrame", base: RateBase) -> HazardRa
 
 
 def _counts_by_fault(frame: "pd.DataFrame") -> tuple[Any, Any, Any, Any]:
-    """Count, for each fault: guided hazards, random hazards, guided runs, random runs."""
+    """Count for each fault: guided hazards, random hazards, guided runs, random runs (a sample: weighted)."""
     faults = sorted(frame["fault_id"].unique())
     guided, random = frame["method"] == GUIDED, frame["method"] == RANDOM
     hazard = frame["is_hazard"]
+    weights = frame[WEIGHT_COLUMN] if WEIGHT_COLUMN in frame else (hazard | True).astype(int)
     a, b, c, d = (
-        frame.loc[rows, "fault_id"].value_counts().reindex(faults, fill_value=0).to_numpy()
+        weights[rows].groupby(frame.loc[rows, "fault_id"]).sum().reindex(faults, fill_value=0).to_numpy()
         for rows in (guided & hazard, random & hazard, guided, random)
     )
     return a, b, c, d

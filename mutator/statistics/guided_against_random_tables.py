@@ -1,14 +1,17 @@
 """Tables that compare guided with random triggers."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mutator.statistics import guided_against_random
-from mutator.statistics.guided_against_random import RATE_BASES, RateBase
+from mutator.statistics.guided_against_random import METHODS, RATE_BASES, FaultTypeStratum, RateBase
 from mutator.statistics.paired_statistics import PairCounts
 from mutator.statistics.published_counts import THIS_RUN, PublishedCounts, counts_by_source
-from mutator.statistics.shares_with_intervals import share_with_interval
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
+from mutator.statistics.shares_with_intervals import Share, share_with_interval
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
-from mutator.statistics.tallies import tally_by_fault_type
+from mutator.statistics.tallies import flag_of_count, tally_by_fault_type
+from mutator.statistics.weighted_shares import share_of_runs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,10 +24,7 @@ def hazard_odds_sheet(frame: "pd.DataFrame", published: PublishedCounts | None) 
         for source, counts in sources.items():
             parts = guided_against_random.strata_with_both_methods(counts, base)
             pooled = guided_against_random.pool_odds_ratios(parts)
-            rates = (
-                share_with_interval(sum(s.guided_hazards for s in parts), sum(s.guided_runs for s in parts)),
-                share_with_interval(sum(s.random_hazards for s in parts), sum(s.random_runs for s in parts)),
-            )
+            rates = _method_rates(parts, frame if source == THIS_RUN else None, base)
             odds = (
                 pooled.stratum_count,
                 pooled.odds_ratio,
@@ -42,7 +42,8 @@ def hazard_odds_sheet(frame: "pd.DataFrame", published: PublishedCounts | None) 
         "ratio is 1, and `p equal` that it is the same in all fault types; both p-values are too small, "
         "because the tests assume independent runs. Difference: the rate of guided minus that of random "
         "faults, as a fraction. Its interval comes from resampling whole faults (location and value); there "
-        "is none if all faults agree, or for published counts.",
+        "is none if all faults agree, or for published counts. Rates and differences of a sample are "
+        "weighted; odds ratios compare the drawn runs within fault types.",
         heads=(
             *("hazards of", "from", "guided", "random", "fault types"),
             *("odds ratio", "odds ratio, low", "odds ratio, high", "p", "p equal"),
@@ -50,6 +51,23 @@ def hazard_odds_sheet(frame: "pd.DataFrame", published: PublishedCounts | None) 
         ),
         lines=tuple(lines),
     )
+
+
+def _method_rates(
+    parts: Sequence[FaultTypeStratum], runs: "pd.DataFrame | None", base: RateBase
+) -> tuple[Share, Share]:
+    """Return the hazard rates of guided and random faults, weighted if `runs` are a sample."""
+    if runs is None or WEIGHT_COLUMN not in runs:
+        return (
+            share_with_interval(sum(s.guided_hazards for s in parts), sum(s.guided_runs for s in parts)),
+            share_with_interval(sum(s.random_hazards for s in parts), sum(s.random_runs for s in parts)),
+        )
+    rows = runs[runs["kind"].isin([stratum.fault_type for stratum in parts])]
+    whole = flag_of_count(rows, base)
+    guided, random = (
+        share_of_runs(rows, rows["is_hazard"], whole & (rows["method"] == method)) for method in METHODS
+    )
+    return guided, random
 
 
 def _difference_cells(frame: "pd.DataFrame", base: RateBase, source: str) -> tuple[SheetCell, ...]:
@@ -69,8 +87,7 @@ def hazards_by_fault_type_sheet(frame: "pd.DataFrame", published: PublishedCount
             for stratum, p, adjusted in zip(
                 parts, p_values, guided_against_random.holm_adjusted(p_values), strict=True
             ):
-                guided = share_with_interval(stratum.guided_hazards, stratum.guided_runs)
-                random = share_with_interval(stratum.random_hazards, stratum.random_runs)
+                guided, random = _method_rates((stratum,), frame if source == THIS_RUN else None, base)
                 lines.append((base, source, stratum.fault_type, guided, random, PValue(p), PValue(adjusted)))
     return Sheet(
         name="guided_against_random_by_fault_type",

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 from mutator.statistics.bootstrap_median_intervals import median_interval
 from mutator.statistics.results_frame import select_common_columns
-from mutator.statistics.shares_with_intervals import share_with_interval
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
+from mutator.statistics.weighted_shares import share_of_runs
 from mutator.targets.hazard_severity import SEVERITY_CLASSES, SeverityScale
 from mutator.targets.stored_target_facts import MetricFacts
 
@@ -61,11 +62,12 @@ def severity_by_fault_type_sheet(frame: "pd.DataFrame", scale_for_note: Severity
     With a scale, the note gives the classes in words.
     """
     lines: list[tuple[SheetCell, ...]] = []
-    columns = [name for name in ("kind", "severity") if name in frame]
+    columns = [name for name in ("kind", "severity", "fault_id", WEIGHT_COLUMN) if name in frame]
     activated = frame.loc[frame["is_activated"], columns]
     for kind, group in _runs_by_fault_type(activated) if "severity" in frame else ():
-        counts = [int((group["severity"] == name).sum()) for name in SEVERITY_CLASSES]
-        shares = [share_with_interval(count, len(group)) for count in (sum(counts), *counts)]
+        of_class = [group["severity"] == name for name in SEVERITY_CLASSES]
+        any_class = group["severity"].isin(SEVERITY_CLASSES)
+        shares = [share_of_runs(group, flags, flags | True) for flags in (any_class, *of_class)]
         lines.append((kind, *shares))
     return Sheet(
         name="severity",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from mutator.results.outcome_counting import are_usable
 from mutator.results.table_columns import hazard_names_of_frame
 from mutator.results.table_reader import Results
+from mutator.statistics.sample_weights import WEIGHT_COLUMN, with_weights
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,8 +25,9 @@ def load_usable_results(results: Path) -> "pd.DataFrame":
     results.parquet next to it is invalid.
 
     Endings that say nothing about a fault (`UNUSABLE_ENDINGS`) are left out; crashes and timeouts are kept.
+    If the plan is a sample, the column `weight` has how many planned experiments each stands for.
     """
-    return prepare_results(Results(results.parent).frame())
+    return with_weights(prepare_results(Results(results.parent).frame()), results.parent)
 
 
 def prepare_results(frame: "pd.DataFrame") -> "pd.DataFrame":
@@ -59,6 +61,7 @@ _SHARED_COLUMNS = (
     "trigger",
     "seed",
     "status",
+    WEIGHT_COLUMN,
 )
 
 

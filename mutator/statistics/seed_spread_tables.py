@@ -11,8 +11,9 @@ import numpy as np
 
 from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.results_frame import hazard_names
-from mutator.statistics.shares_with_intervals import share_with_interval
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.statistics_sheet import PercentRate, Sheet, SheetCell
+from mutator.statistics.weighted_shares import share_of_runs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +22,8 @@ ALL_FAULTS = "all"  # label of the lines for all faults
 _NOTE = (
     "All seeds: the share over all runs, with its 95 % Wilson interval. Between seeds: the 95 % interval "
     "from 9,999 resamples of whole seeds (none if all seeds agree). Least and largest: the smallest and the "
-    "largest share of a seed."
+    "largest share of a seed. Shares of a sample are weighted, and its intervals over runs come from "
+    "resampling whole faults."
 )
 _COLUMN_HEADS = (
     *("faults", "what", "of", "all seeds", "between seeds, low", "between seeds, high"),
@@ -96,15 +98,17 @@ def _sheet_lines(
     seeds = seeds_of(frame)
     if len(seeds) < 2:
         return
+    weights = frame[WEIGHT_COLUMN].to_numpy(dtype=float) if WEIGHT_COLUMN in frame else None
     codes, flags = pd.Index(seeds).get_indexer(pd.Index(frame["seed"].astype(str))), _event_flags(frame)
     for group, chosen in groups.items():
         for part, whole in shares:
             is_in_whole = chosen & flags[whole] & (codes >= 0)
             counts, wholes = (
-                np.bincount(codes[rows], minlength=len(seeds))
+                np.bincount(codes[rows], None if weights is None else weights[rows], minlength=len(seeds))
                 for rows in (is_in_whole & flags[part], is_in_whole)
             )
-            yield (group, part, whole, *_spread_cells(seeds, counts, wholes))
+            share = share_of_runs(frame, pd.Series(flags[part]), pd.Series(is_in_whole))
+            yield (group, part, whole, share, *_spread_cells(seeds, counts, wholes))
 
 
 def _spread_cells(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) -> tuple[SheetCell, ...]:
@@ -114,7 +118,6 @@ def _spread_cells(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) 
     ]
     least, largest = min(rates, default=None), min(rates, key=lambda k: (-k[0], k[1]), default=None)
     return (
-        share_with_interval(int(counts.sum()), int(wholes.sum())),
         *(PercentRate(low), PercentRate(high)),
         *((PercentRate(least[0]), least[1]) if least else (None, None)),
         *((PercentRate(largest[0]), largest[1]) if largest else (None, None)),

@@ -8,6 +8,7 @@ from mutator.statistics.event_time_statistics import FirstAlertsByHazardRun
 from mutator.statistics.guided_against_random import GUIDED, RANDOM
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.results_frame import select_common_columns
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.statistics.tallies import tally_by_fault_type, tally_by_scenario
 
@@ -37,12 +38,13 @@ def run_sheets(
         return ()
     scenarios, kinds = tally_by_scenario(frame), tally_by_fault_type(frame)
     methods = sorted({method for method, _ in scenarios})
+    sample = frame if WEIGHT_COLUMN in frame else None
     has_alerts = first_alerts_by_hazard_run is not None
     sheets = [
-        summary_tables.summary_sheet(method, scenarios, published, has_alerts=has_alerts)
+        summary_tables.summary_sheet(method, scenarios, published, has_alerts=has_alerts, sample=sample)
         for method in methods
     ]
-    sheets += [summary_tables.coverage_sheet(method, kinds, published) for method in methods]
+    sheets += [summary_tables.coverage_sheet(method, kinds, published, sample=sample) for method in methods]
     if {GUIDED, RANDOM} <= set(methods):
         sheets += [
             guided_against_random_tables.hazard_odds_sheet(frame, published),

@@ -40,6 +40,17 @@ def tally_of_runs(frame: "pd.DataFrame") -> Tally:
     )
 
 
+def flag_of_count(frame: "pd.DataFrame", name: str) -> "pd.Series":
+    """Return which rows a count of `Tally` counts."""
+    if name == "injected":
+        return frame["is_activated"] | True
+    if name == "hazards_no_alerts":
+        return frame["is_hazard"] & ~frame["is_alert"]
+    if name == "alerts_no_hazards":
+        return frame["is_alert"] & ~frame["is_hazard"]
+    return frame[f"is_{name.removesuffix('s')}"]
+
+
 def sum_tallies(tallies: Iterable[Tally]) -> Tally:
     """Return the sum over groups. A count is None if it is None in any group."""
     summands = list(tallies)

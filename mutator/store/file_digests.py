@@ -36,7 +36,7 @@ _MIN_BYTES_FOR_THREADS = 20_000_000  # the least number of bytes for which threa
 # folders of append-only files; digests are added when the files are closed
 SEGMENT_FOLDERS = ("records", "proof")
 _LEDGER_NAME_PATTERN = re.compile(  # what the ledger may name
-    r"(run\.json|campaign\.yaml|plan\.csv|plan/(experiments|faults|batches|scenarios)\.jsonl|(checks|reviewed)\.json"
+    r"(run\.json|campaign\.yaml|plan\.csv|plan/(experiments|faults|batches|scenarios|strata)\.jsonl|(checks|reviewed)\.json"
     r"|golden/(.+/.+|[^/]+\.packed)|(records|proof)/[^/]+\.jsonl)"
 )
 

@@ -17,6 +17,7 @@ from mutator.store import file_digests, plan_file, verified_runs_cache
 from mutator.store.checksummed_lines import Segment, intact_lines, read_segment, unread_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.packed_patches import PatchFolder
+from mutator.store.plan_strata import STRATA_FILE
 from mutator.store.planned_scenarios import SCENARIOS_FILE
 from mutator.store.records import RECORDS_SCHEMA, parse_ending, second_record_error
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD, RunHead
@@ -32,6 +33,7 @@ IRREPLACEABLE_FILES = (
     plan_file.FAULTS_FILE,
     plan_file.BATCHES_FILE,
     SCENARIOS_FILE,
+    STRATA_FILE,
 )
 DIGESTED_TOP_FILES = (HEAD, CAMPAIGN_FILE, "plan.csv", "checks.json", "reviewed.json")
 _MOST_NAMED_EXPERIMENTS = 5  # in one message: the ids of a million experiments would fill it

@@ -1,7 +1,7 @@
 """The first part of a report: the worst experiment in words, with its replay, and four numbers."""
 
 from mutator.report.answer_parts import warning_filter_values
-from mutator.report.first_screen_facts import describe_change, key_numbers, sample_note, worst_row
+from mutator.report.first_screen_facts import describe_change, key_numbers, worst_row
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.results.note_on_golden_hazards import golden_hazards_note
@@ -70,7 +70,7 @@ def build_first_screen_panel(run: ReportedRun) -> Panel:
     frame = run.frame.assign(warning=warning_filter_values(run.frame))
     # of runs that a search chose, shares say nothing
     numbers = () if run.explored else key_numbers(frame, has_alerts=run.folder.has_alerts)
-    note = sample_note(run.folder)
+    note = run.sampled_plan.note if run.sampled_plan else ""
     kicker = _words_before_worst_experiment(worst) if worst else ""
     change = describe_change(run)
     lines = [f"* **{number.value}** {number.meaning} ({number.evidence})" for number in numbers]

@@ -112,11 +112,12 @@
     return form("Run a small campaign", "A sample of a campaign's experiments, spread over its plan.", [
       labelled("Campaign", campaign),
       labelled("At most", el("input", { name: "limit", type: "number", min: 1, max: 1000, value: 20, required: true }), "experiments"),
+      labelled("Draw", el("select", { name: "draw" }, el("option", { value: "even" }, "each variant equally often"), el("option", { value: "proportional" }, "in proportion to the plan"))),
       labelled("Run folder", name, "next to the other runs"),
       labelled("Only", el("input", { name: "only", placeholder: "scenario == \"S1\"", autocomplete: "off", spellcheck: "false" }), "a filter; empty: all"),
       labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: the campaign's"),
     ], "Run it", (values) => ({
-      kind: "campaign", campaign: values.campaign, name: values.name.trim(), limit: Number(values.limit), only: orNull(values.only), seed: numberOrNull(values.seed),
+      kind: "campaign", campaign: values.campaign, name: values.name.trim(), limit: Number(values.limit), proportional: values.draw === "proportional", only: orNull(values.only), seed: numberOrNull(values.seed),
     }), (_, { name: run }) => location.assign(`/live/${encodeURIComponent(run)}`));
   }
 

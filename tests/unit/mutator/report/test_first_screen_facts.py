@@ -5,17 +5,13 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-import yaml
 
-from mutator._common.hashing import as_json_types
 from mutator._common.message_text import with_unbreakable_numbers
 from mutator.model import Status
-from mutator.report.first_screen_facts import key_numbers, sample_note, worst_record, worst_row
+from mutator.report.first_screen_facts import key_numbers, worst_record, worst_row
 from mutator.report.panels.first_screen_panel import build_first_screen_panel
 from mutator.report.reported_run import ReportedRun
-from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import CAMPAIGN_FILE
 
 from .made_run import make_run
 
@@ -77,22 +73,18 @@ def test_times_of_one_fault_have_no_interval(frame: pd.DataFrame) -> None:
     assert time.evidence == "no interval: too few different faults; 1.50 s at the soonest"
 
 
-@pytest.mark.parametrize(
-    ("campaign", "is_even"),
-    [({"sample": 3}, True), ({"sample": 3, "proportional": True}, False), ({}, False), ([], False)],
-)
-def test_an_even_sample_is_said_to_have_no_rate_of_all(
-    tmp_path: Path, campaign: object, is_even: bool
-) -> None:
-    folder = RunFolder.open(make_run(tmp_path, choices=as_json_types(Choices())))
-    (tmp_path / CAMPAIGN_FILE).write_text(yaml.safe_dump(campaign))
-    assert ("even sample" in sample_note(folder)) == is_even
+def test_rates_of_a_sample_are_weighted_and_say_so(frame: pd.DataFrame) -> None:
+    """Five faults acted, three of them hazardous. The first stands for six, each other one for itself."""
+    weighted = frame.assign(weight=[6.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    acted, dangerous, silent, _ = key_numbers(weighted, has_alerts=True)
+    assert (acted.value, dangerous.value, silent.value) == ("91 %", "80 %", "88 %")
+    assert dangerous.evidence.startswith("3 of 5 drawn; weighted; 95 % interval ")
 
 
-def test_a_limit_makes_an_even_sample_unless_it_left_out_nothing(tmp_path: Path) -> None:
-    assert "even sample" in sample_note(RunFolder.open(make_run(tmp_path)))
-    (tmp_path / "other").mkdir()
-    assert not sample_note(RunFolder.open(make_run(tmp_path / "other", experiments=2)))
+def test_a_sample_without_strata_has_counts_instead_of_rates(frame: pd.DataFrame) -> None:
+    numbers = key_numbers(frame.assign(weight=float("nan")), has_alerts=True)[:3]
+    assert [number.value for number in numbers] == ["5 of 6", "3 of 5", "2 of 3"]
+    assert {number.percents for number in numbers} == {None}
 
 
 def test_the_worst_usable_experiment_is_the_first(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from mutator.errors import MutatorError
 from mutator.model import Status
 from mutator.store import file_digests, integrity, plan_file
 from mutator.store.checksummed_lines import LineWriter
+from mutator.store.plan_strata import STRATA_FILE
 from mutator.store.records import RECORDS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_environments import SessionEnvironment
@@ -47,7 +48,7 @@ SEALED = (
     "plan.csv",
     "checks.json",
     "digests.json",
-    *(plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE),
+    *(plan_file.EXPERIMENTS_FILE, plan_file.FAULTS_FILE, STRATA_FILE),
     *("golden/A/log.npz", "golden/A/said.json"),
     *("records/0001-a.jsonl", "proof/0001-a.jsonl"),
 )
