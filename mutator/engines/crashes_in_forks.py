@@ -6,11 +6,13 @@ A forked run leaves a crash to the reference engine unless all of this holds:
 * a step of the run raised it while the fault had been active (not its end, which writes the results);
 * it and its causes are of classes that do not depend on the process (`in_target/crash_description.py`), and
   do not name a folder of the run, which differs;
-* the reference engine has rerun three crashes of the same classes, with the same message and at the same
-  place, in this session, and each time found the same. If it finds another one, no such crash is judged here.
+* in this session, the reference engine has rerun three crashes of the same classes, one of them with the same
+  message at the same place, and each time got the same. If it gets another result once, no crash of these
+  classes is judged here.
 
 The last point covers what only a fresh interpreter has: an entry module that catches some exceptions of its
-steps, and messages that tell something about the process, such as a name of its main module.
+steps, and messages that tell something about the process, such as a name of its main module. Such a message
+is the same in both processes, or the rerun of the first crash with it shows that it is not.
 """
 
 from dataclasses import dataclass
@@ -19,57 +21,59 @@ from typing import Any
 
 from mutator._common.hashing import content_id
 from mutator.engines.authenticated_files import AuthenticatedFiles
-from mutator.engines.engine_jobs import Job, JobResult, RaisedException, TargetStack
+from mutator.engines.engine_jobs import CrashKind, Job, JobResult, RaisedException, TargetStack
 from mutator.engines.process_endings import ProcessEnding, exception_in_report
 from mutator.engines.received_fork_output import ReceivedForkOutput
 from mutator.mutants.injected_line_syntax import mutated_line_of
 from mutator.mutants.probe_contract import is_probe_path
 
-NEEDED_CONFIRMATIONS = 3  # crashes of a kind that the reference engine runs, too
+NEEDED_CONFIRMATIONS = 3  # crashes with the same classes that the reference engine runs, too
 _SAME, _OTHER = "same", "other"  # what the reference engine gave
 _MOST_FRAMES = 10_000
 
 
 class CrashKinds:
-    """The kinds of crashes that the reference engine has confirmed, for all workers of a session. Those of a
-    kind have the same classes, message and place.
-    """
+    """The crashes that the reference engine has confirmed, for all workers of a session."""
 
     def __init__(self, files: AuthenticatedFiles) -> None:
         self._files = files
-        self._confirmed: set[str] = set()
+        self._confirmed: set[CrashKind] = set()
 
-    def is_confirmed(self, crash_kind: str) -> bool:
-        if crash_kind not in self._confirmed:
-            if self._has(crash_kind, _OTHER) or self._same_count(crash_kind) < NEEDED_CONFIRMATIONS:
+    def is_confirmed(self, kind: CrashKind) -> bool:
+        if self._has(kind.classes_id, _OTHER):
+            return False
+        if kind not in self._confirmed:
+            if not self._has(kind.place_id, _SAME) or self._same_count(kind) < NEEDED_CONFIRMATIONS:
                 return False
-            self._confirmed.add(crash_kind)
+            self._confirmed.add(kind)
         return True
 
-    def note(self, crash_kind: str, *, is_same: bool) -> None:
+    def note(self, kind: CrashKind, *, is_same: bool) -> None:
         """Note what the reference engine gave for a crash. Once it gave another result, that stays."""
         if not is_same:
-            self._confirmed.discard(crash_kind)
-            self._files.save(_file_name(crash_kind, _OTHER), b"1")
-        elif (count := self._same_count(crash_kind)) < NEEDED_CONFIRMATIONS:
-            self._files.save(_file_name(crash_kind, f"{_SAME}-{count}"), b"1")
+            self._save(kind.classes_id, _OTHER)
+            return
+        self._save(kind.place_id, _SAME)
+        if (count := self._same_count(kind)) < NEEDED_CONFIRMATIONS:
+            self._save(kind.classes_id, f"{_SAME}-{count}")
 
-    def _same_count(self, crash_kind: str) -> int:
-        return sum(self._has(crash_kind, f"{_SAME}-{number}") for number in range(NEEDED_CONFIRMATIONS))
+    def _same_count(self, kind: CrashKind) -> int:
+        return sum(self._has(kind.classes_id, f"{_SAME}-{number}") for number in range(NEEDED_CONFIRMATIONS))
 
-    def _has(self, crash_kind: str, answer: str) -> bool:
-        return self._files.load(_file_name(crash_kind, answer)) is not None
+    def _has(self, crash_id: str, answer: str) -> bool:
+        return self._files.load(_file_name(crash_id, answer)) is not None
+
+    def _save(self, crash_id: str, answer: str) -> None:
+        self._files.save(_file_name(crash_id, answer), b"1")
 
 
-def _file_name(crash_kind: str, answer: str) -> str:
-    return f"crash-{crash_kind}-{answer}"
+def _file_name(crash_id: str, answer: str) -> str:
+    return f"crash-{crash_id}-{answer}"
 
 
 @dataclass(frozen=True, slots=True)
 class CrashOfFork:
-    """An exception, and an id of its classes and those of its causes, its message and its place."""
-
-    kind_id: str
+    kind: CrashKind
     exception: RaisedException
 
 
@@ -93,10 +97,13 @@ def judge_crash(
         raised = exception_in_report({"error": {**report["error"], "stacks": stacks}}, job)
         if raised is None:
             return None
-        kind_id = content_id([crash["classes"], raised.message, raised.place])
+        classes = crash["classes"]
+        kind = CrashKind(
+            classes_id=content_id([classes]), place_id=content_id([classes, raised.message, raised.place])
+        )
     except (LookupError, TypeError, ValueError):  # a run can write anything to its report
         return None
-    return CrashOfFork(kind_id, raised)
+    return CrashOfFork(kind, raised)
 
 
 def _stack_of_mutant(job: Job, frames: list[list[Any]]) -> TargetStack:

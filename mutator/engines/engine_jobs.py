@@ -120,6 +120,14 @@ def innermost_position(stack: TargetStack) -> tuple[str, int] | None:
     return next(((path, line) for path, line, _ in stack if not is_probe_path(path)), None)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrashKind:
+    """An id of the classes of an exception and its causes, and one of classes, message and place."""
+
+    classes_id: str
+    place_id: str
+
+
 @dataclass(frozen=True, kw_only=True)
 class JobResult:
     """The result of a job. `out` holds the target's trace and record if `status` is OK.
@@ -128,7 +136,7 @@ class JobResult:
     * `was_fault_active`: whether an injection was active
     * `log_tail`: the tail of what the run printed
     * `fallback_reason`: why another engine executed the job
-    * `crash_kind`: of a crash that was judged from its fork, the id of its kind
+    * `crash_kind`: the kind of a crash that was judged from its fork
     * `fork_step`: the step before which the run was forked
     * `was_stopped_at_hazard`: whether a terminal hazard ended the run early
     * `third_party_modules`: the third-party top-level modules that the run imported
@@ -148,7 +156,7 @@ class JobResult:
     log_tail: str = ""
     mode: RunMode = RunMode.REFERENCE
     fallback_reason: str = ""
-    crash_kind: str = ""
+    crash_kind: CrashKind | None = None
     fork_step: int = 0
     was_stopped_at_hazard: bool = False
     third_party_modules: tuple[str, ...] = ()

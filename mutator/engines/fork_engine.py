@@ -140,7 +140,7 @@ class ForkEngine:
         return result
 
     def _confirm_crash(self, job: Job, of_fork: JobResult) -> JobResult:
-        assert of_fork.exception is not None
+        assert of_fork.exception is not None and of_fork.crash_kind is not None
         reason = f"ended as crashed: {of_fork.exception.description_without_place}"
         result = self._run_on_reference_engine(job, reason)
         self._crash_kinds.note(of_fork.crash_kind, is_same=is_same_crash(of_fork, result))

@@ -77,7 +77,7 @@ class ForkResults:
             executed_functions=executed_functions_from_json(report.get("executed")) if report else None,
             watch_report={name: report[name] for name in OBSERVATION_KEYS} if observe and report else {},
             mode=self._mode,
-            crash_kind=crash.kind_id if crash else "",
+            crash_kind=crash.kind if crash else None,
         )
 
 

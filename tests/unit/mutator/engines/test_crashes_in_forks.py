@@ -8,7 +8,7 @@ import pytest
 
 from mutator.engines.authenticated_files import AuthenticatedFiles
 from mutator.engines.crashes_in_forks import NEEDED_CONFIRMATIONS, CrashKinds, judge_crash
-from mutator.engines.engine_jobs import Job
+from mutator.engines.engine_jobs import CrashKind, Job
 from mutator.engines.in_target.fork_output import ForkOutput
 from mutator.engines.process_endings import ProcessEnding
 from mutator.engines.received_fork_output import ReceivedForkOutput
@@ -29,20 +29,30 @@ def kinds(folder: Path, secret: bytes = b"s") -> CrashKinds:
     return CrashKinds(AuthenticatedFiles(folder, secret))
 
 
-def test_a_kind_needs_three_confirmations_by_any_worker(tmp_path: Path) -> None:
+def kind(classes: str = "a", place: str = "p") -> CrashKind:
+    return CrashKind(classes_id=classes, place_id=f"{classes}-{place}")
+
+
+def test_classes_need_three_confirmations_by_any_worker_and_each_place_one(tmp_path: Path) -> None:
+    for place in range(NEEDED_CONFIRMATIONS):
+        assert not kinds(tmp_path).is_confirmed(kind(place="0"))
+        kinds(tmp_path).note(kind(place=str(place)), is_same=True)
+    assert all(kinds(tmp_path).is_confirmed(kind(place=str(place))) for place in range(NEEDED_CONFIRMATIONS))
+    assert not kinds(tmp_path).is_confirmed(kind(place="new"))
+    assert not kinds(tmp_path).is_confirmed(kind(classes="b"))
+    assert not kinds(tmp_path, b"of somebody else").is_confirmed(kind(place="0"))
+
+
+def test_one_other_result_of_the_reference_engine_excludes_the_classes_for_every_worker(
+    tmp_path: Path,
+) -> None:
+    worker = kinds(tmp_path)
     for _ in range(NEEDED_CONFIRMATIONS):
-        assert not kinds(tmp_path).is_confirmed("a")
-        kinds(tmp_path).note("a", is_same=True)
-    assert kinds(tmp_path).is_confirmed("a")
-    assert not kinds(tmp_path).is_confirmed("b")
-    assert not kinds(tmp_path, b"of somebody else").is_confirmed("a")
-
-
-def test_one_other_result_of_the_reference_engine_excludes_a_kind(tmp_path: Path) -> None:
-    kinds(tmp_path).note("a", is_same=False)
-    for _ in range(NEEDED_CONFIRMATIONS + 1):
-        kinds(tmp_path).note("a", is_same=True)
-    assert not kinds(tmp_path).is_confirmed("a")
+        worker.note(kind(), is_same=True)
+    assert worker.is_confirmed(kind())
+    kinds(tmp_path).note(kind(place="other"), is_same=False)
+    worker.note(kind(), is_same=True)
+    assert not worker.is_confirmed(kind())
 
 
 def judge(work: Path, ended: ProcessEnding = ENDED, active: bool = True, **changes: Any) -> Any:
@@ -90,14 +100,15 @@ def test_what_a_fork_alone_does_not_show_is_left_to_the_reference_engine(
     assert judge(tmp_path, **changes) is None
 
 
-def test_crashes_of_a_kind_have_the_same_message_and_place(tmp_path: Path) -> None:
+def test_message_and_place_count_beside_the_classes(tmp_path: Path) -> None:
     """A message can tell something about the process, and an entry module can catch by message."""
     error = {"kind": "ZeroDivisionError", "message": "float division by zero", "stacks": [[]]}
     frames = [["a.py", 5, 4, False], ["a.py", 5, 11, True]]
     crash = {"classes": ["builtins.ZeroDivisionError"], "frames": [frames]}
     judged = judge(tmp_path), judge(tmp_path), judge(tmp_path, error=error), judge(tmp_path, crash=crash)
-    same, again, *others = (each.kind_id for each in judged)
+    same, again, *others = (each.kind for each in judged)
     assert same == again and same not in others
+    assert {other.classes_id for other in others} == {same.classes_id}
 
 
 def test_a_message_with_a_folder_of_the_run_is_left_to_the_reference_engine(tmp_path: Path) -> None:
