@@ -13,6 +13,7 @@ from mutator.model import Fault
 from mutator.operators.executed_lines_and_types import (
     ExecutedLinesByFile,
     GoldenRunInputs,
+    TypesByFileAndLine,
     measure_executed_lines,
     measure_variable_types,
 )
@@ -49,9 +50,12 @@ class OperatorFaultFinder:
         reading: str,
     ) -> list[OperatorFault]:
         golden_runs = list(golden_inputs_by_scenario.values())
+        types = None
+        if any_needs_types(selection.operators):  # first, because these runs note the lines, too
+            types = measure_variable_types(self._manifest, golden_runs, self._limits)
         lines_by_run = measure_executed_lines(self._manifest, golden_runs, self._limits)
         executed = dict(zip(golden_inputs_by_scenario, lines_by_run, strict=True))
-        mutations = self._find_mutations(selection, golden_runs, list(executed.values()))
+        mutations = self._find_mutations(selection, list(executed.values()), types)
         draw = sample_mutations(mutations, selection.sample_size, seed)
         if not draw:
             raise MutatorError(
@@ -83,12 +87,9 @@ class OperatorFaultFinder:
     def _find_mutations(
         self,
         selection: OperatorSelection,
-        golden_runs: Sequence[GoldenRunInputs],
         executed: Sequence[ExecutedLinesByFile],
+        types: TypesByFileAndLine | None,
     ) -> SelectedMutations:
-        types = None
-        if any_needs_types(selection.operators):
-            types = measure_variable_types(self._manifest, golden_runs, self._limits)
         files = dict.fromkeys(path for lines in executed for path in lines)
         union = {path: frozenset().union(*(lines.get(path, ()) for lines in executed)) for path in files}
         # types follow from the golden runs, and so do the lines; seeds can differ in types alone

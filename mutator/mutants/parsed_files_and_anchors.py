@@ -4,6 +4,7 @@ import ast
 from codecs import BOM_UTF8
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 from mutator._common.interrupts import delaying_interrupts
@@ -132,6 +133,7 @@ def parsed_file(tree: SourceTree, path: str) -> ParsedFile:
     return tree.derive_once(path, parse_file, with_defence_lines=True)
 
 
+@lru_cache(maxsize=64)  # planning, checks and report each read the tree
 @delaying_interrupts()
 def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
     """Parse a file of the target; MutatorError if it is not Python, or already has injected lines."""

@@ -76,16 +76,18 @@ def _reports_of_golden_runs(
             engine = ReferenceEngine(manifest, scratch / "work", limits)
             for i, golden_run in enumerate(golden_runs):
                 if reports[i] is None:
-                    reports[i] = _run_and_read_report(
-                        engine, golden_run, scratch / "work" / f"lines-{i}", schema
-                    )
-                    _save_cached(_cache_key(manifest, golden_run, schema), reports[i] or {})
+                    folder = scratch / "work" / f"lines-{i}"
+                    by_schema = _run_and_read_reports(engine, golden_run, folder, schema)
+                    for name, report in by_schema.items():
+                        _save_cached(_cache_key(manifest, golden_run, name), report)
+                    reports[i] = by_schema[schema]
     return [report or {} for report in reports]
 
 
-def _run_and_read_report(
+def _run_and_read_reports(
     engine: ReferenceEngine, golden_run: GoldenRunInputs, folder: Path, schema: str
-) -> dict[str, Any]:
+) -> dict[str, dict[str, Any]]:
+    """Return what a golden run reports, by schema: a run that notes types notes the lines, too."""
     job = Job(
         name=folder.name,
         scenario=golden_run.scenario,
@@ -103,7 +105,8 @@ def _run_and_read_report(
             expected="a fault-free run that succeeds",
             remedy="run `mutator check --drive`",
         )
-    return dict(execution.executed_lines if schema == _LINES_SCHEMA else execution.variable_types)
+    lines = {_LINES_SCHEMA: dict[str, Any](execution.executed_lines)}
+    return lines if schema == _LINES_SCHEMA else {**lines, _TYPES_SCHEMA: dict(execution.variable_types)}
 
 
 def _cache_key(manifest: TargetManifest, golden_run: GoldenRunInputs, schema: str) -> str:

@@ -11,7 +11,11 @@ from mutator.errors import MutatorError
 from mutator.limits import Limits
 from mutator.model import Status
 from mutator.operators import executed_lines_and_types
-from mutator.operators.executed_lines_and_types import GoldenRunInputs, measure_executed_lines
+from mutator.operators.executed_lines_and_types import (
+    GoldenRunInputs,
+    measure_executed_lines,
+    measure_variable_types,
+)
 from mutator.workspace import Workspace
 
 LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
@@ -41,19 +45,38 @@ def test_lines_are_recorded_from_the_first_observation(toycar: Workspace, tmp_pa
     assert "toycar/show.py" not in noted.executed_lines
 
 
+def count_runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    runs: list[str] = []
+    measured = executed_lines_and_types._run_and_read_reports
+    monkeypatch.setattr(
+        executed_lines_and_types,
+        "_run_and_read_reports",
+        lambda *given: (runs.append("run"), measured(*given))[1],
+    )
+    return runs
+
+
+def test_a_run_that_notes_types_notes_the_lines_too(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One golden run serves both."""
+    manifest = toycar.manifest("toycar")
+    drive = GoldenRunInputs(scenario=toycar.scenario("A"), changes=(), seed=7)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "lines"))
+    lines = measure_executed_lines(manifest, [drive], LIMITS)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "both"))
+    runs = count_runs(monkeypatch)
+    assert measure_variable_types(manifest, [drive], LIMITS)["toycar/sensing.py"]
+    assert measure_executed_lines(manifest, [drive], LIMITS) == lines and len(runs) == 1
+
+
 def test_executed_lines_are_cached(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     manifest = toycar.manifest("toycar")
     drive = GoldenRunInputs(scenario=toycar.scenario("A"), changes=(), seed=7)
-    runs: list[str] = []
-    measured = executed_lines_and_types._run_and_read_report
-    monkeypatch.setattr(
-        executed_lines_and_types,
-        "_run_and_read_report",
-        lambda *given: (runs.append("run"), measured(*given))[1],
-    )
+    runs = count_runs(monkeypatch)
     [first] = measure_executed_lines(manifest, [drive], LIMITS)
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 1
     [entry] = cache_layout_and_pruning.cached_executed_lines_folder().iterdir()
