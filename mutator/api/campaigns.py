@@ -4,7 +4,6 @@ import warnings
 from pathlib import Path
 
 from mutator._common.argument_checks import check_type, check_whole_number
-from mutator.api.exploring_campaigns import explore_campaign
 from mutator.api.runs import Run
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.campaigns.campaign_files import load_campaign
@@ -67,6 +66,8 @@ def run(
     opened_workspace, folder = open_workspace(workspace), Path(out)
     loaded = load_campaign(opened_workspace.campaign(campaign))
     if loaded.exploration_request is not None:
+        from mutator.api.exploring_campaigns import explore_campaign
+
         options = {"reviewed": reviewed, "accept_versions": accept_versions, "since": since is not None}
         return explore_campaign(
             opened_workspace,

@@ -9,7 +9,6 @@ from mutator._common.confined_files import path_below
 from mutator._common.files import ScratchFolder
 from mutator.api.experiment_results import TraceFrames, trace_frame
 from mutator.api.run_contents import RunContents
-from mutator.api.shrinks import Shrinker
 from mutator.api.smallest_form import SmallestForm
 from mutator.api.stored_experiments import StoredExperiment
 from mutator.api.trials import Trial, build_trial
@@ -106,6 +105,8 @@ class RunExperiment(StoredExperiment):
         # two levels below runs/, so that the newest run there is still this one
         run = self.run.path.resolve()
         folder = run.parent / "shrunk" / f"{run.name}-{self.id}"
+        from mutator.api.shrinks import Shrinker
+
         shrinker = Shrinker(self.run, self.experiment, self.record, start)
         return shrinker.shrink(
             Path(out) if out is not None else folder, workers=workers, engine=engine, notify=progress

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from mutator._common.message_text import describe_choices, describe_seeds
 from mutator._common.table_rendering import TextTable
-from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import trace_frame
 from mutator.api.notebook_html import facts_html, text_html
 from mutator.api.run_experiments import RunExperiment
@@ -17,7 +16,6 @@ from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.audit.run_digests_and_seal import Seals, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.session_summary import Summary
-from mutator.execution.shard_merging import merge_shards
 from mutator.exports import ExportSelection, Format, find_export
 from mutator.exports import ExportTable as ExportedTable
 from mutator.exports.run_export import export
@@ -56,6 +54,8 @@ from mutator.targets.overhead_view_json import scene_as_json
 if TYPE_CHECKING:
     import pandas as pd
 
+    from mutator.api.audits import Audit
+
 
 def load_run(path: str | Path, *, workspace: WorkspaceLike = None) -> "Run":
     """Open the run folder at `path`, finished or not. Content is read on first use.
@@ -76,6 +76,8 @@ def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions
     """
     if isinstance(shards, str | Path):  # a likely mistake; a text would be read letter by letter
         raise MutatorError(repr(str(shards)), argument="shards", expected="a list of run folders")
+    from mutator.execution.shard_merging import merge_shards
+
     merge_shards([Path(shard) for shard in shards], Path(out), accept_versions=accept_versions)
     return load_run(out)
 
@@ -293,9 +295,11 @@ class Run(RunFigures):
         """Raise CheckFailed if the equivalence check of the run failed."""
         equivalence_check.compare_sample(self.folder, self.folder.records())
 
-    def verify(self, *, rerun: int = 0, expect: str | None = None, repair: bool = False) -> Audit:
+    def verify(self, *, rerun: int = 0, expect: str | None = None, repair: bool = False) -> "Audit":
         """Audit the folder: see `mutator.verify`."""
         workspace = self._workspace_if_any()
+        from mutator.api.audits import verify
+
         return verify(self.path, rerun=rerun, expect=expect, repair=repair, workspace=workspace)
 
     def delete(self) -> None:

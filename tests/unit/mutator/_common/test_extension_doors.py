@@ -64,7 +64,7 @@ def test_no_other_module_looks_for_entry_points() -> None:
     # pytest loads the plugin; `local` asks only whether it will
     assert {str(path.relative_to(folder)) for path in looking} == {
         "_common/extension_doors.py",
-        "execution/local_distributor.py",
+        "execution/local_pytest_session.py",
     }
 
 
