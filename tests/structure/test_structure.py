@@ -20,7 +20,14 @@ from mutator.cli.shared_options import WorkspaceOptions
 CLONE = Path(__file__).parents[2]
 TOP_MODULES = 12
 # may import the harness inside functions, to load only what a command needs
-LAZY = ("mutator/__init__.py", "mutator/cli/", "mutator/execution/pytest_plugin.py")
+# doors load what a call needs, and a finished run no pytest; elsewhere, imports are at the top
+LAZY = (
+    "mutator/__init__.py",
+    "mutator/api/",
+    "mutator/cli/",
+    "mutator/execution/local_distributor.py",
+    "mutator/execution/pytest_plugin.py",
+)
 
 
 def modules(root: Path) -> Iterator[Path]:
