@@ -330,6 +330,22 @@ class RunError:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DefenceActivity:
+    """What a defence did in one run, if it acted. Times in s; an activation is a row of steps in which it
+    acted.
+    """
+
+    name: str  #: name of the defence
+    first: float  #: time of the first step in which it acted
+    last: float  #: time of the last such step
+    activations: int  #: number of activations
+    steps: int  #: number of steps in which it acted
+    conflicts: int  #: number of steps in which its range for a command and another defence's did not overlap
+    #: (command, largest change of what the controller commanded, value furthest from 0 that it commanded)
+    commands: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
     """The stored result of one experiment. Times are simulation times in s; None: no such event."""
 
@@ -371,3 +387,6 @@ class Record:
     t_back: float | None = added_field(None)
     #: whether the controller was not `engaged` at the end, although it was in the golden run
     ended_disengaged: bool = added_field(False)
+    #: what the defences in the tree did, in the order in which they act; only those that acted, and only if
+    #: the run ended normally
+    defences: tuple[DefenceActivity, ...] = added_field(())

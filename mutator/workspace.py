@@ -34,6 +34,7 @@ from mutator.model import ConcreteScenario, Fault
 from mutator.mutants.defended_target import defended_manifest
 from mutator.results.table_columns import check_column_names
 from mutator.store.planned_scenarios import PlannedScenarios, planned_scenarios_of
+from mutator.store.run_head import RunHead
 from mutator.stpa.accidents_and_hazards import HazardList, load_hazard_list
 from mutator.stpa.context_tables import ContextTable, load_context_table
 from mutator.stpa.hazard_analysis_yaml import (
@@ -138,6 +139,10 @@ class Workspace:
     def defended(self, manifest: TargetManifest, names: Iterable[str]) -> TargetManifest:
         """Return the target with these defences of the library in its tree."""
         return defended_manifest(manifest, [self.defence(name) for name in names], self.templates)
+
+    def manifest_of(self, head: RunHead) -> TargetManifest:
+        """Return the target of a run folder, with the defences in the tree that it ran."""
+        return self.defended(self.manifest(head.target), [defence.name for defence in head.defences])
 
     def scale_of(self, manifest: TargetManifest) -> SeverityScale | None:
         """Return the severity scale of a target, with the rules for its hazards; None without `severity`.

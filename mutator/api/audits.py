@@ -11,6 +11,7 @@ from mutator._common.hashing import digest
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
+from mutator.audit.defended_run_audit import defended_run_checks
 from mutator.audit.run_audit import SOURCES_CHECK, AuditCheck, run_audit_checks
 from mutator.audit.run_digests_and_seal import Seals, seals_of, unsealed_facts
 from mutator.audit.run_repair import repair_run as put_aside
@@ -127,6 +128,7 @@ def verify(
     facts = _run_facts(folder)
     if not any(check.differences for check in checks if check.checked_parts == SOURCES_CHECK):
         checks += _exploration_checks(folder, opened_workspace, facts)
+    checks += defended_run_checks(folder, opened_workspace, facts)
     if rerun:
         checks.append(_rerun_check(folder, opened_workspace, rerun, facts))
     seals = _seals_if_undamaged(folder, checks)
@@ -220,7 +222,7 @@ def _exploration_checks(
     try:
         if workspace is None or not (is_exploration(folder) or (folder.path / ENVELOPES_FILE).exists()):
             return []
-        manifest = workspace.manifest(folder.head.target)
+        manifest = workspace.manifest_of(folder.head)
     except MutatorError:  # other checks report a damaged file and a missing target
         return []
 

@@ -314,7 +314,7 @@ class Run(RunFigures):
 def scene_if_any(run: Run) -> "dict[str, Any] | None":
     """Return what a replay of the run draws; None without a library that has it."""
     try:
-        return scene_as_json(run.workspace.manifest(run.folder.head.target))
+        return scene_as_json(run.workspace.manifest_of(run.folder.head))
     except (MutatorError, KeyError):
         return None
 

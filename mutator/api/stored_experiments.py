@@ -69,7 +69,7 @@ class StoredRun:
     @cached_property
     def manifest(self) -> TargetManifest:
         """The manifest of the run's target in the workspace."""
-        return self.workspace.manifest(self.folder.head.target)
+        return self.workspace.manifest_of(self.folder.head)
 
     @cached_property
     def faults(self) -> dict[str, Fault]:

@@ -91,7 +91,7 @@ def check_result_problems(folder: RunFolder) -> Problems:
     checked_alone = folder.golden_runs if folder.is_bench else folder.listed_goldens
     expected_names = [
         "anchors",
-        *(["canary"] if folder.head.canary else []),
+        *(["canary"] if folder.head.canary and not folder.head.defences else []),
         *(f"{kind} {run.key}" for run in checked_alone for kind in ("golden", "null mutant")),
         *(f"family {name}" for name in (planned.families if planned and not folder.is_bench else ())),
     ]

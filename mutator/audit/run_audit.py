@@ -28,6 +28,7 @@ from mutator.campaigns.plan_freezing import PLAN_CSV, plan_csv_bytes
 from mutator.campaigns.plan_tally import plan_digest
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
+from mutator.model import GoldenClass
 from mutator.store import file_digests, plan_file
 from mutator.store.checks_file import CHECKS_FILE as CHECKS
 from mutator.store.checks_file import CHECKS_SCHEMA
@@ -79,7 +80,7 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
     source_check = AuditCheck.from_problems(
         SOURCES_CHECK, len(head.sources), _source_problems(folder, workspace)
     )
-    manifest = workspace.manifest(head.target) if workspace and not source_check.differences else None
+    manifest = workspace.manifest_of(head) if workspace and not source_check.differences else None
     records, proven = load_stored_records(folder, "records"), load_stored_records(folder, "proof")
     golden_hazards = golden_verdict_problems(folder, manifest) if manifest else ()
     idle = not_activated_run_problems(folder, manifest, records) if manifest else ()
@@ -182,7 +183,7 @@ def _plan_problems(folder: RunFolder) -> Problems:
         target=campaign.target,
         chunks=recomputed_chunks(folder),
         limits=campaign.limits,
-        include=campaign.include,
+        include=GoldenClass.HAZARD_WITHOUT_FAULT if head.defences else campaign.include,
         goldens=tuple(golden_run.to_stored() for golden_run in plan.tally.listed_goldens),
         canary_hazard=campaign.canary.hazard if campaign.canary else None,
     )
@@ -225,7 +226,7 @@ def _source_problems(folder: RunFolder, workspace: Workspace | None) -> Problems
             expected="the run's sources (trees and patches were not compared)",
         )
         return
-    manifest = workspace.manifest(head.target)
+    manifest = workspace.manifest_of(head)
     current_digests = RunInputs.of_run(workspace, folder).digest_by_source()
     for name, recorded in head.sources.items():
         if current_digests.get(name) != recorded:

@@ -66,7 +66,7 @@ def family_problems(folder: RunFolder, workspace: Workspace) -> Iterator[Mutator
 
 def _draw_problems(folder: RunFolder, workspace: Workspace, planned: set[str]) -> Iterator[MutatorError]:
     campaign, head = load_campaign_of_run(folder), folder.head
-    scenarios = CampaignScenarios(workspace, campaign, workspace.manifest(head.target), head.seed)
+    scenarios = CampaignScenarios(workspace, campaign, workspace.manifest_of(head), head.seed)
     drawn = {name for name in scenarios.names if scenarios.digest_and_concrete(name)[1] is not None}
     missing = sorted(drawn - planned) if campaign.is_fault_free else []
     for name in [*sorted(planned - drawn), *missing]:

@@ -60,7 +60,7 @@ def _rebuilt_golden_chunk(
     if workspace is None or not keys.keys() >= {*numbers}:
         return None
     try:
-        manifest = workspace.manifest(folder.head.target)
+        manifest = workspace.manifest_of(folder.head)
         goldens = [
             load_manifest_channels(manifest, golden_output_folder(folder.path / GOLDEN_FOLDER, keys[number]))
             for number in numbers

@@ -22,6 +22,7 @@ from mutator.campaigns.installed_studies import CheckableStudy, load_installed_s
 from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.config.yaml_files import load_yaml_model
 from mutator.config.yaml_source_lines import KeyPath, YamlSource
+from mutator.defences.defence_facts import set_name
 from mutator.engines.run_limits import LIMITS_THAT_ARE_MEASURED, limits_before_measuring
 from mutator.errors import MutatorError
 from mutator.faults.library_readings import SpecReadings
@@ -30,6 +31,7 @@ from mutator.model import AfterHazard, GoldenClass, Method
 from mutator.targets.hazard_severity import SeverityScale
 
 SCHEMA = "campaign/1"
+WITHOUT_DEFENCES = "none"  # in `defences`: the run without any
 _SPEC_SUFFIXES = (".yaml", ".yml")
 _Value = TypeVar("_Value")
 _NO_TRIGGERS = TriggersModel.model_construct()  # of a campaign without faults
@@ -90,6 +92,7 @@ class Campaign:
     is_bench: bool = False  # what a bench fixed when it was opened; its experiments come in batches
     exploration: ExplorationSection | None = None  # what a bench explores; None if others decide
     exploration_request: ExplorationRequest | None = None  # what a campaign explores; None if it lists faults
+    defence_sets: tuple[tuple[str, ...], ...] = ()  # names of defences; the run without any is not listed
 
     @property
     def seed(self) -> int:
@@ -206,7 +209,33 @@ def load_campaign(path: Path) -> Campaign:
         expectation=model.expect,
         include=GoldenClass(model.include) if model.include else None,
         exploration_request=model.explore,
+        defence_sets=_defence_sets(model, source),
     )
+
+
+def _defence_sets(model: CampaignModel, source: YamlSource) -> tuple[tuple[str, ...], ...]:
+    sets: list[tuple[str, ...]] = []
+    for i, item in enumerate(model.defences or ()):
+        names = (item,) if isinstance(item, str) else tuple(item)
+        if names == (WITHOUT_DEFENCES,):
+            continue
+        for name in names:
+            if name == WITHOUT_DEFENCES or not name.isidentifier() or names.count(name) > 1:
+                raise source.error(
+                    ("defences", i),
+                    f"'{name}'",
+                    expected=f"names of different defences, or `{WITHOUT_DEFENCES}` alone",
+                    remedy="correct the set",
+                )
+        if not names or set(names) in map(set, sets):
+            raise source.error(
+                ("defences", i),
+                "a set of no defence" if not names else f"the set {set_name(names)} twice",
+                expected="different sets of defences",
+                remedy="remove it",
+            )
+        sets.append(names)
+    return tuple(sets)
 
 
 def _operator_selection(item: SelectionModel) -> OperatorSelection | None:

@@ -224,6 +224,12 @@ class CampaignModel(StrictModel, title="The file"):
         description="The seeds; the campaign, including its `sample`, is repeated with each. `--seed` runs "
         "one seed instead.",
     )
+    defences: list[str | list[str]] | None = Field(
+        None,
+        description="Sets of the library's [defences](defence.md): the campaign runs again with each set in "
+        "the target's tree, in a run folder of its own, `defended/<set>`. An item is the name of a defence, "
+        "a list of several, or `none`, the run without defences, which is there in any case.",
+    )
     canary: YamlRecord[Canary] | None = Field(
         None,
         description="A check that a known fault causes a hazard. Only a campaign that selects nothing but "
@@ -289,6 +295,7 @@ class CampaignModel(StrictModel, title="The file"):
             "include": self.include,
             "study": self.study,
             "after_hazard": self.after_hazard is not AfterHazard.GO_ON,
+            "defences": self.defences is not None,
         }
         for key, value in others.items():
             if value:

@@ -39,7 +39,7 @@ class FaultPositions:
     @classmethod
     def of_run(cls, folder: RunFolder, workspace: Workspace) -> "FaultPositions":
         """Return the positions of a run's faults; MutatorError if the target has changed since the run."""
-        manifest = workspace.manifest(folder.head.target)
+        manifest = workspace.manifest_of(folder.head)
         if manifest.tree.digest != folder.head.sources["target"]:
             raise MutatorError(
                 f"the target in {manifest.root} has changed since this run was planned",

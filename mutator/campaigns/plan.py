@@ -189,6 +189,9 @@ class SeedBySeedPlan:
         if (expectation := self.campaign.expectation) is not None:
             scale, source = workspace.scale_of(self._manifest), self.campaign.yaml_source
             check_expectation(expectation, source, ("expect",), self._manifest.hazard_names, scale)
+        for i, names in enumerate(self.campaign.defence_sets):
+            with self.campaign.locating_errors(("defences", i)):
+                workspace.defended(self._manifest, names)
         if self.campaign.is_fault_free:
             check_choices_without_faults(self.choices)
         if self.campaign.after_hazard is AfterHazard.STOP:

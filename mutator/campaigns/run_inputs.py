@@ -62,7 +62,7 @@ class RunInputs(PickledValue):
         """Return the inputs of a run folder in a workspace; MutatorError as in `from_workspace`."""
         planned = planned_scenarios_of(folder.path)
         inputs = cls.from_workspace(
-            workspace, workspace.manifest(folder.head.target), {run.scenario for run in folder.listed_goldens}
+            workspace, workspace.manifest_of(folder.head), {run.scenario for run in folder.listed_goldens}
         )
         return inputs._with_families(workspace, planned.families, planned) if planned else inputs
 
@@ -83,6 +83,7 @@ class RunInputs(PickledValue):
             "target": self.manifest.tree.digest,
             "manifest": digest(read_bounded(self.manifest.path)),
             "templates": self.fault_models.digest,
+            **{f"defence {name}": sha256 for name, sha256 in self.manifest.defences.items()},
             **{f"scenario {name}": digest(read_bounded(path)) for name, path in self.scenario_files.items()},
             **{f"family {name}": digest(read_bounded(path)) for name, path in self.family_files.items()},
         }

@@ -104,7 +104,7 @@ def begin_session_environment(
     `records` is the glob of the session's files; `packages` are what it uses besides. MutatorError as in
     `accepted_version_differences`.
     """
-    manifest = workspace.manifest(folder.head.target)
+    manifest = workspace.manifest_of(folder.head)
     folder_by_name = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
     folder_by_name |= {"overlay": manifest.overlay} if manifest.overlay else {}
     importer = TRACE_IMPORTER_DOOR.other_package_of(Path(manifest.trace_file).suffix.removeprefix("."))

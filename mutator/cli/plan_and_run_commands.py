@@ -229,6 +229,7 @@ def run(
         summary = finished_run.summary
         assert summary is not None  # `mutator.run` always sets it
         _print_results(terminal, finished_run, summary)
+        _print_defended_runs(terminal, summary)
         with showing_errors(step), campaign_progress(terminal) as notify:
             # resuming an unfinished run can change the worst experiments
             if stills and summary.exit_code == 0:
@@ -252,6 +253,23 @@ def run(
         step.show(output, to_stderr=as_json)
     if summary.exit_code:
         raise typer.Exit(summary.exit_code)
+
+
+def _print_defended_runs(terminal: Terminal, summary: "Summary") -> None:
+    """Print what came of the campaign with each of its sets of defences."""
+    for name, defended in summary.defended.items():
+        counts = ", ".join(f"{outcome} {count}" for outcome, count in defended.outcomes.items())
+        done = f"{defended.done} of {defended.planned} experiments done, {defended.ran} now"
+        terminal.print_text(f"with {name}: {counts}; {done}")
+        for note in (defended.provisional_note, defended.reuse_note, defended.proof_note):
+            if note:
+                terminal.print_text(f"  {note}")
+        for digest_name, value in defended.seals.digest_by_name().items():
+            terminal.print_text(f"  {digest_name}: {value}")
+        for experiment, detail in defended.harness_errors[:5]:
+            terminal.print_text(f"  {experiment}: {detail}", style="red")
+        if defended.problem:
+            terminal.print_error(defended.problem)
 
 
 def _take_stills(terminal: Terminal, run: "Run", notify: "ProgressCallback", workers: int) -> None:
@@ -283,9 +301,14 @@ def _print_results_as_json(
     paths = {"run": str(out), "report": str(report_paths[0]) if report_paths else None}
     errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
     outcomes = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
-    terminal.print_json(
-        counts | paths | outcomes | asdict(summary.seals) | {"not_forked": summary.not_forked}
-    )
+    sets = {
+        name: {"planned": defended.planned, "done": defended.done, "ran": defended.ran}
+        | {"outcomes": defended.outcomes}
+        | asdict(defended.seals)
+        for name, defended in summary.defended.items()
+    }
+    more = {"not_forked": summary.not_forked} | ({"defended": sets} if sets else {})
+    terminal.print_json(counts | paths | outcomes | asdict(summary.seals) | more)
 
 
 def _print_results(terminal: Terminal, run: "Run", summary: "Summary") -> None:

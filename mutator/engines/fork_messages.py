@@ -10,6 +10,7 @@ from mutator.engines.job_folder import JobFolder
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads
 from mutator.errors import NotForkable
 from mutator.limits import Limits
+from mutator.mutants.defence_runtime import defence_report_request
 from mutator.mutants.probe_contract import probe_attributes_after, probe_module
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_at_hazard_code import stop_function_source
@@ -59,6 +60,7 @@ def fork_request(
         "out": str(home.output_folder),
         "child_activations": str(home.child_activations_path),
         "args": None,
+        "defences": defence_report_request(manifest),
         "cpu_s": limits.cpu_s,
         "memory_mb": limits.memory_mb,
         "disk_mb": limits.disk_mb,

@@ -46,6 +46,7 @@ from mutator.engines.process_endings import (
 from mutator.engines.sandbox import Sandbox
 from mutator.limits import Limits
 from mutator.model import Status
+from mutator.mutants.defence_runtime import defence_report_request
 from mutator.mutants.parsed_files_and_anchors import parsed_file
 from mutator.mutants.probe_contract import probe_attributes_after, probe_module
 from mutator.targets.manifest import TargetManifest
@@ -192,6 +193,7 @@ class ReferenceEngine:
             "args": list(arguments),
             "probe": probe_module(self.manifest.probe_package) if job.mutant_id is not None else None,
             "out": str(home.output_folder),
+            "defences": defence_report_request(self.manifest),
             "report": str(home.report_path),
             "inactive": str(home.inactive_marker),
             "child_activations": str(home.child_activations_path),

@@ -4,16 +4,25 @@
 """
 
 import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+from mutator.campaigns.campaign_files import load_campaign
+from mutator.campaigns.defended_runs import defended_run_path, open_or_freeze_defended_run
+from mutator.defences.defence_facts import set_name
 from mutator.errors import MutatorWarning
 from mutator.execution.distributor_choice import Distributor, packages_of_distributor
+from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.local_distributor import LocalDistributor
 from mutator.execution.progress_reporting import reporting_progress
+from mutator.execution.session import Session
 from mutator.execution.session_opening import open_session
 from mutator.execution.session_summary import Summary
 from mutator.execution.stray_files import StrayFiles
 from mutator.store.plan_choices import Choices
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
 from mutator.workspace import Workspace
 
@@ -46,31 +55,57 @@ def run_campaign(
     `last_failed`, only those run that failed in `since` or, without it, in `out`. Another thread calls
     `notify` about twice a second.
 
+    Then the campaign runs with each of its sets of defences; the summary has theirs.
+
     Raises MutatorError for wrong input, choices that differ from the frozen ones, or a changed campaign file
     or target. Raises CheckFailed if an unapproved mutant would run with `reviewed`, or if a
     preflight or equivalence check fails.
     """
-    with open_session(
-        workspace,
-        campaign,
-        out,
-        workers=workers,
-        choices=choices or Choices(),
-        engine=engine,
-        reviewed=reviewed,
-        accept_versions=accept_versions,
-        reuse=reuse,
-        since=since,
-        last_failed=last_failed,
-        notify=notify,
-    ) as session:
-        session.prepare(
-            packages_of_distributor(distributor), checks_beside=isinstance(distributor, LocalDistributor)
+    choices = choices or Choices()
+
+    def run_in(open_folder: Callable[[], RunFolder], run: Path, earlier: Path | None) -> Summary:
+        with open_session(
+            workspace,
+            open_folder,
+            run,
+            workers=workers,
+            engine=engine,
+            accept_versions=accept_versions,
+            reuse=reuse,
+            since=earlier,
+            last_failed=last_failed,
+            notify=notify,
+        ) as session:
+            return _run_session(session, distributor)
+
+    summary = run_in(
+        lambda: open_or_freeze_run(workspace, campaign, out, choices, reviewed=reviewed), out, since
+    )
+    sets = load_campaign(workspace.campaign(campaign)).defence_sets
+    if not sets or summary.interrupted or summary.problem:
+        return summary
+    undefended, summaries = RunFolder.open(out), dict[str, Summary]()
+    for names in sets:
+        earlier = defended_run_path(since, names) if since else None
+        of_set = run_in(
+            partial(open_or_freeze_defended_run, workspace, undefended, names),
+            defended_run_path(undefended.path, names),
+            earlier if earlier and RunFolder.exists(earlier) else None,
         )
-        if session.pending or session.proof:
-            stray_files = StrayFiles()
-            with reporting_progress(session):
-                distributor.run(session)
-            if remark := stray_files.remark_on_new_files():
-                warnings.warn(remark, MutatorWarning, stacklevel=2)
-        return session.finish()
+        summaries[set_name(names)] = of_set
+        if of_set.interrupted or of_set.problem:
+            break
+    return replace(summary, defended=summaries)
+
+
+def _run_session(session: Session, distributor: Distributor) -> Summary:
+    session.prepare(
+        packages_of_distributor(distributor), checks_beside=isinstance(distributor, LocalDistributor)
+    )
+    if session.pending or session.proof:
+        stray_files = StrayFiles()
+        with reporting_progress(session):
+            distributor.run(session)
+        if remark := stray_files.remark_on_new_files():
+            warnings.warn(remark, MutatorWarning, stacklevel=3)
+    return session.finish()

@@ -20,6 +20,7 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.execution.campaign_items import ItemSource
 from mutator.execution.finished_run_keys import harness_digest
+from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.item_running import ItemRunner, ItemsStart
 from mutator.execution.listed_items import ItemListing, list_plan
 from mutator.execution.session import Session
@@ -162,11 +163,11 @@ class CampaignRun(FileRun):
         session = self._open.enter_context(
             open_session(
                 self._workspace,
-                self.path,
+                lambda: open_or_freeze_run(
+                    self._workspace, self.path, out, Choices(), reviewed=options.reviewed
+                ),
                 out,
                 workers=options.workers,
-                choices=Choices(),
-                reviewed=options.reviewed,
                 accept_versions=options.accept_versions,
                 reuse=options.reuse,
                 notify=self._notify,

@@ -30,6 +30,7 @@ from mutator.outcomes.actuator_change_and_speeds import (
     speeds_after_activation,
 )
 from mutator.outcomes.channel_departures import departures_from_golden
+from mutator.outcomes.defence_reports import load_defence_activities
 from mutator.outcomes.failure_cause import judge_failure, run_error
 from mutator.outcomes.hazard_and_metric_judgement import (
     RunJudgement,
@@ -353,6 +354,7 @@ class ExperimentRunner:
             golden_hazards=tuple(compared.golden_hazards),
             t_back=difference.t_back,
             ended_disengaged=not judged.is_engaged_at_end and is_engaged_at_end(self.manifest, reference),
+            defences=load_defence_activities(self.manifest, execution.out),
         )
 
     def _detail(

@@ -26,7 +26,7 @@ class RunTraces:
 
     @cached_property
     def manifest(self) -> TargetManifest:
-        return self.workspace.manifest(self.folder.head.target)
+        return self.workspace.manifest_of(self.folder.head)
 
     @cached_property
     def _records(self) -> Mapping[str, Record]:

@@ -89,7 +89,7 @@ class Session:
         self.notify = notify  # tells whoever started or watches the session how far it is
         self.pending: tuple[PendingChunk, ...] = ()
         self.proof: tuple[equivalence_check.SampledExperiment, ...] = ()
-        self.manifest = workspace.manifest(folder.head.target)
+        self.manifest = workspace.manifest_of(folder.head)
         self._earlier = earlier or EarlierRunUse()
         self._earlier.check_target(folder)
         self.engine = choose_engine(engine, self.manifest)
@@ -378,7 +378,9 @@ class Session:
     def _has_reached_nothing(self, outcomes: Counter[str]) -> bool:
         """Whether the whole plan shows no hazard. A part of it alone cannot tell."""
         is_whole = self.folder.shard is None and not self._unselected_count
-        return self.folder.canary is None and not outcomes[Outcome.HAZARD] and is_whole
+        is_undefended = not self.folder.head.defences  # no hazard with defences is a result
+        no_hazard = self.folder.canary is None and not outcomes[Outcome.HAZARD]
+        return no_hazard and is_whole and is_undefended
 
     @contextmanager
     def _noting_full_disk(self) -> Iterator[None]:

@@ -1,7 +1,7 @@
 """Opens a session: locks the run folder, freezes the plan if needed, and clears leftovers."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
@@ -12,11 +12,9 @@ from mutator._common.interrupts import raising_keyboard_interrupts
 from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.errors import MutatorError
 from mutator.execution.earlier_run import EarlierRunUse, open_earlier_run
-from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.session import Session
 from mutator.execution.watched_progress import writing_progress
 from mutator.store import file_digests
-from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress, ProgressCallback
 from mutator.workspace import Workspace
@@ -25,20 +23,18 @@ from mutator.workspace import Workspace
 @contextmanager
 def open_session(
     workspace: Workspace,
-    campaign: str | Path,
+    open_folder: Callable[[], RunFolder],
     out: Path,
     *,
     workers: int,
-    choices: Choices,
     engine: str | None = None,
-    reviewed: bool = False,
     accept_versions: bool = False,
     reuse: bool = True,
     since: Path | None = None,
     last_failed: bool = False,
     notify: ProgressCallback | None = None,
 ) -> Iterator[Session]:
-    """Lock the run folder `out`, freeze the plan if needed, and yield the session.
+    """Lock the run folder `out`, open it or freeze its plan with `open_folder`, and yield the session.
 
     Scratch folders are deleted before and after the session.
     """
@@ -49,7 +45,7 @@ def open_session(
         if notify and not RunFolder.exists(out):
             notify(Progress(stage="plan"))
         try:
-            folder = open_or_freeze_run(workspace, campaign, out, choices, reviewed=reviewed)
+            folder = open_folder()
         except MutatorError:
             if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is worth keeping
                 shutil.rmtree(out, ignore_errors=True)

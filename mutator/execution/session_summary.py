@@ -1,7 +1,8 @@
 """What a session reports when it ends."""
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator.audit.run_digests_and_seal import Seals
@@ -39,6 +40,8 @@ class Summary:
     since_note: str = ""  #: what `since` left out, and why others ran; empty without it
     is_provisional: bool = False  #: whether the session ended before all checks had passed
     unselected: int = 0  #: experiments without a record that `last_failed` did not select
+    #: the summaries of the runs with defences, by the names of their sets
+    defended: Mapping[str, "Summary"] = field(default_factory=dict)
 
     @property
     def reuse_note(self) -> str:
@@ -95,8 +98,13 @@ class Summary:
     @property
     def exit_code(self) -> int:
         """0: success; 1: every experiment was left out, or no hazard was reached, and no canary shows that
-        one can be; 3: harness errors, or experiments left to run; 130: interrupted.
+        one can be; 3: harness errors, or experiments left to run; 130: interrupted. The highest of this run
+        and of those with defences.
         """
+        return max([self._exit_code_of_run, *(summary.exit_code for summary in self.defended.values())])
+
+    @property
+    def _exit_code_of_run(self) -> int:
         if self.interrupted:
             return EXIT_INTERRUPTED
         is_proved = self.proof is None or self.proof.is_complete or bool(self.unselected)

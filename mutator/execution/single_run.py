@@ -158,7 +158,7 @@ def is_same_record(folder: RunFolder, stored: Record | None, rerun_record: Recor
 
 def manifest_of_unchanged_target(workspace: Workspace, folder: RunFolder) -> TargetManifest:
     """Return the target of a run; MutatorError if its sources have changed since the run."""
-    manifest = workspace.manifest(folder.head.target)
+    manifest = workspace.manifest_of(folder.head)
     now = RunInputs.of_run(workspace, folder).digest_by_source()
     check_sources(folder.path, folder.head.sources, now)
     return manifest

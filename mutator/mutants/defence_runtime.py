@@ -8,7 +8,7 @@ from mutator.defences.defence import Defence, Sense
 from mutator.errors import MutatorError
 from mutator.mutants.template_rendering import render_template
 from mutator.targets.actuation import Actuation
-from mutator.targets.manifest import TargetManifest
+from mutator.targets.manifest import DEFENCE_REPORT_FILE, TargetManifest
 from mutator.triggers.conditions import TIME, to_python_source
 
 
@@ -24,6 +24,15 @@ def defence_module_name(defence: str) -> str:
 
 def defence_module_names(defences: Sequence[Defence]) -> list[str]:
     return [defence_module_name(defence.name) for defence in defences]
+
+
+def defence_report_request(manifest: TargetManifest) -> tuple[str, str] | None:
+    """Return the module that reports on the defences in a target's tree, and the file for its report."""
+    if not manifest.defences:
+        return None
+    package = manifest.probe_package
+    module = f"{package}.{DEFENCE_MODULE_NAME}" if package else DEFENCE_MODULE_NAME
+    return module, DEFENCE_REPORT_FILE
 
 
 def render_runtime(

@@ -17,7 +17,6 @@ from mutator.mutants.parsed_files_and_anchors import ParsedFile, ResolvedAnchor,
 from mutator.mutants.splicing import LineEdit, apply_edits, defence_edit, defence_import_edit, mutated_bytes
 from mutator.targets.actuation import Actuation
 from mutator.targets.defence_lines import defence_tag_of, without_defence_lines
-from mutator.targets.defended_tree import DefendedTree
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.observed_values import Observation
 
@@ -48,9 +47,12 @@ def defended_manifest(
         module_path(package, name): defence.model_code
         for name, defence in zip(defence_module_names(ordered), ordered, strict=True)
     }
-    tree = manifest.tree.with_changes({**_changed_files(manifest, actuation, ordered), **added})
-    names = tuple(defence.name for defence in ordered)
-    return replace(manifest, defended_tree=DefendedTree(defences=names, tree=tree))
+    files = {**_changed_files(manifest, actuation, ordered), **added}
+    defended = replace(
+        manifest, defences={defence.name: defence.digest for defence in ordered}, defence_files=files
+    )
+    vars(defended)["tree"] = manifest.tree.with_changes(files)  # the cached property: no second reading
+    return defended
 
 
 def _changed_files(

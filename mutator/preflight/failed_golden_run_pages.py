@@ -44,7 +44,7 @@ def with_golden_run_pages(error: CheckFailed, run: Path, workspace: Workspace) -
 
 def write_golden_run_pages(folder: RunFolder, workspace: Workspace) -> list[Path]:
     """Write a page for each golden run whose check failed, unless it left no trace. Return their paths."""
-    manifest = workspace.manifest(folder.head.target)
+    manifest = workspace.manifest_of(folder.head)
     failed = {check.name: check.detail for check in check_results(folder) if not check.passed}
     pages = []
     for golden_run in folder.goldens_with_files:

@@ -113,7 +113,7 @@ def describe_unreached_triggers(workspace: Workspace, folder: RunFolder) -> list
     keyed = ((folder.golden_run_of(e).key, e) for e in plan_file.iterate_experiments(folder.path))
     experiments = ((key, experiment) for key, experiment in keyed if key not in left_out)
     observed = unreached_triggers.load_observations(_pending_folder(folder))
-    manifest = workspace.manifest(folder.head.target)
+    manifest = workspace.manifest_of(folder.head)
     return (
         unreached_triggers.describe_unreached(workspace, manifest, experiments, observed) if observed else []
     )
@@ -141,7 +141,7 @@ class PreflightChecks:
         self.workspace = workspace.with_scenarios_of(folder.path)
         self.folder = folder
         self.pending_folder = _pending_folder(folder)
-        self.manifest: TargetManifest = workspace.manifest(head.target)
+        self.manifest: TargetManifest = workspace.manifest_of(head)
         self.models = workspace.fault_models()
         self.golden_runs = folder.golden_runs
         self.campaign = load_campaign_of_run(folder)
@@ -301,7 +301,8 @@ class PreflightChecks:
             campaign=self.campaign,
             golden_runs=self.golden_runs,
             seed=self.folder.head.seed,
-            canary_experiment=self.folder.canary,
+            # a defence can well stop the canary, which the undefended run has driven
+            canary_experiment=None if self.folder.head.defences else self.folder.canary,
             scratch_folder=self.folder.scratch_folder,
             pending_folder=pending_folder,
             observation_store=self.observation_store,

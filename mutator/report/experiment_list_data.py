@@ -142,7 +142,7 @@ def _describe_truncation(run: ReportedRun) -> str:
 def _film_and_scene_facts(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
     """Whether films can be made (true without a manifest), and the scene for the replay."""
     try:
-        manifest = workspace.manifest(folder.head.target) if workspace else None
+        manifest = workspace.manifest_of(folder.head) if workspace else None
     except MutatorError:
         manifest = None
     filmed = manifest is None or manifest.film is not None

@@ -29,7 +29,7 @@ OnProgress = Callable[[Progress], None]
 
 def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, on_progress: OnProgress) -> str:
     """Take the run's missing stills. Return why the first experiment without stills has none, or ''."""
-    manifest = workspace.manifest(folder.head.target)
+    manifest = workspace.manifest_of(folder.head)
     if manifest.film is None or not manifest.film.pictures:
         return ""
     experiments = PlannedExperiments(folder.path)

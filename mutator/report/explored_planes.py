@@ -68,7 +68,7 @@ class ExploredPlanes:
         if workspace is None:
             return cls(envelopes=(), problem="The envelopes are not shown, because there is no library here.")
         try:
-            replay = replay_exploration(folder, workspace.manifest(folder.head.target))
+            replay = replay_exploration(folder, workspace.manifest_of(folder.head))
         except (MutatorError, KeyError) as error:
             return cls(envelopes=(), problem=f"The envelopes cannot be shown: {error}")
         about = {hazard.name: hazard.about for hazard in folder.head.about_hazards}

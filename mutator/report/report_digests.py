@@ -140,7 +140,7 @@ def _library_digests(folder: RunFolder, workspace: Workspace | None) -> object:
         files += [
             file for file in _digests_by_name(workspace.library, paths) if not file[0].startswith("reviews/")
         ]
-        return [files, workspace.manifest(folder.head.target).tree.digest]
+        return [files, workspace.manifest_of(folder.head).tree.digest]
     except (MutatorError, KeyError):
         return [files, None]
 

@@ -118,7 +118,7 @@ class ReportedRun:
             return ()
         if not self._loaded_fault_free_runs:
             try:
-                manifest = self.workspace.manifest(self.folder.head.target)
+                manifest = self.workspace.manifest_of(self.folder.head)
                 self._loaded_fault_free_runs.append(load_fault_free_runs(self.folder, manifest))
             except (MutatorError, KeyError):
                 self._loaded_fault_free_runs.append(())
@@ -132,7 +132,7 @@ class ReportedRun:
             return None
         ends: dict[str, float] = {}
         try:
-            manifest = self.workspace.manifest(self.folder.head.target)
+            manifest = self.workspace.manifest_of(self.folder.head)
             for golden_run in self.folder.goldens_with_files:
                 trace = load_trace(manifest, self.folder.golden_folder(*golden_run), [])
                 end = float(trace[manifest.time_channel][-1])

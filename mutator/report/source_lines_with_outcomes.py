@@ -95,7 +95,7 @@ class SourceLines:
             if fault.module == OPERATOR_FAULTS_MODULE
         }
         try:
-            manifest = workspace.manifest(folder.head.target) if workspace else None
+            manifest = workspace.manifest_of(folder.head) if workspace else None
         except (MutatorError, KeyError):
             manifest = None
         if manifest is None:

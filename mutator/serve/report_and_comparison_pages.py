@@ -119,7 +119,7 @@ class RunPages:
 
     def _scene(self, run: Path) -> dict[str, Any] | None:
         try:
-            return scene_as_json(self._workspace.manifest(RunFolder.open(run).head.target))
+            return scene_as_json(self._workspace.manifest_of(RunFolder.open(run).head))
         except (MutatorError, KeyError):
             return None
 
@@ -127,7 +127,7 @@ class RunPages:
         folder = RunFolder.open(run)
         try:
             return fault_free_alerts_note(
-                load_fault_free_runs(folder, self._workspace.manifest(folder.head.target))
+                load_fault_free_runs(folder, self._workspace.manifest_of(folder.head))
             )
         except (MutatorError, KeyError):
             return ""

@@ -7,6 +7,7 @@ from mutator.store import file_digests
 from mutator.store.run_head import CAMPAIGN_FILE, HEAD
 
 DAMAGED_FOLDER, TRACES_FOLDER = "damaged", "traces"
+DEFENDED_FOLDER = "defended"  # with a run folder for each set of defences
 SIGNATURE_FILES = ("seal.json", "seal.json.sig")
 _EXPORTED_TABLES = ("results", "propagation", "timings")
 ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any text, including folders
@@ -25,6 +26,7 @@ ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any
     *("golden/*/*", "golden/*.packed", "patches/*.blocks"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
     "executed/*.jsonl",
+    f"{DEFENDED_FOLDER}/*",
     *("series/*.js", "series/*.blocks"),
     *(f"{TRACES_FOLDER}/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
     *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),

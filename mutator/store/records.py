@@ -9,7 +9,15 @@ from typing import Any, NamedTuple
 
 from mutator._common.confined_files import path_below
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import AgainstGolden, ObservedActivation, Outcome, Record, RunError, Status
+from mutator.model import (
+    AgainstGolden,
+    DefenceActivity,
+    ObservedActivation,
+    Outcome,
+    Record,
+    RunError,
+    Status,
+)
 from mutator.store.indexed_lines import IndexedLine, IndexedLines
 from mutator.store.timings import TIMINGS_FOLDER, TIMINGS_SCHEMA
 
@@ -23,7 +31,7 @@ LINE_SCHEMA_BY_FOLDER = {
 _RECORD_FIELDS = tuple(field.name for field in fields(Record))
 _DATACLASS_FIELDS = ("activation", "error")  # fields that contain dataclasses
 # left out while they have no value, as in most records
-_OMITTED_FIELDS = ("against_golden", "golden_hazards", "t_back", "ended_disengaged")
+_OMITTED_FIELDS = ("against_golden", "golden_hazards", "t_back", "ended_disengaged", "defences")
 
 
 def record_as_json(record: Record) -> dict[str, Any]:
@@ -32,6 +40,8 @@ def record_as_json(record: Record) -> dict[str, Any]:
     for name in _OMITTED_FIELDS:
         if not line[name]:
             del line[name]
+    if record.defences:
+        line["defences"] = [asdict(activity) for activity in record.defences]
     return line | {name: asdict(line[name]) for name in _DATACLASS_FIELDS if line[name] is not None}
 
 
@@ -62,7 +72,13 @@ def record_from_json(data: Mapping[str, Any]) -> Record:
         golden_hazards=_name_value_pairs(data.get("golden_hazards", [])),
         t_back=data.get("t_back"),
         ended_disengaged=bool(data.get("ended_disengaged", False)),
+        defences=tuple([_defence_activity(item) for item in data.get("defences", ())]),
     )
+
+
+def _defence_activity(data: dict[str, Any]) -> DefenceActivity:
+    commands = tuple([(name, change, value) for name, change, value in data["commands"]])
+    return DefenceActivity(**(data | {"commands": commands}))
 
 
 def _name_value_pairs(items: list[list[Any]]) -> tuple[tuple[str, float], ...]:

@@ -10,6 +10,7 @@ from mutator._common.files import json_bytes, read_json
 from mutator._common.hashing import added_field, as_json_types
 from mutator._common.library_and_run_folder_search import RUN_HEAD_FILE
 from mutator._common.typed_json import typed_value_from_json
+from mutator.defences.defence_facts import DefenceFacts
 from mutator.errors import MutatorError, TypeMisfit
 from mutator.families.family_facts import FamilyFacts
 from mutator.limits import Limits
@@ -79,6 +80,7 @@ class RunHead(TargetFacts, PlanFacts):
     goldens: tuple[StoredGolden, ...]
     scenarios: Sha256 | None = added_field(None)  # of plan/scenarios.jsonl, if families gave any scenario
     families: tuple[FamilyFacts, ...] = added_field(())  # those whose scenarios are planned
+    defences: tuple[DefenceFacts, ...] = added_field(())  # in the tree, in the campaign's order
     canary: Mapping[str, Any] | None
     canary_hazard: str | None
     sources: Mapping[str, Sha256]
@@ -129,6 +131,14 @@ def load_head(run: Path) -> RunHead:
         checked_relative_path(name, path)
     for name in (head.target, *(golden[0] for golden in head.goldens)):
         checked_name_not_path(name, path)
+    for defence in head.defences:
+        if not defence.name.isidentifier():
+            raise MutatorError(
+                f"defence {defence.name!a}",
+                where=path,
+                expected="a name of letters, digits and _",
+                remedy=DAMAGED_RUN_REMEDY,
+            )
     return head
 
 

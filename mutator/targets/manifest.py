@@ -16,7 +16,6 @@ from mutator.errors import MutatorError
 from mutator.targets.actuation import Actuation
 from mutator.targets.channels import Channel, Role
 from mutator.targets.command_placeholders import fill_placeholders
-from mutator.targets.defended_tree import DefendedTree
 from mutator.targets.hazard_and_metric_definitions import Hazard, Metric
 from mutator.targets.hazard_severity import DELTA_V_NAME, ContactSettings, SeveritySettings
 from mutator.targets.message_readers import MessageReader
@@ -35,6 +34,7 @@ _DELTA_V_METRIC = Metric(
     about="change of the car's speed in the contact, from contact speed and masses",
 )
 FILM_FOLDER = "film"  # the output folder of a filmed run
+DEFENCE_REPORT_FILE = "defences.json"  # in {out}: what the defences did, written by the harness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +121,8 @@ class TargetManifest:
     engaged: str = ""  # condition that holds while the controller drives
     sandbox: bool = False  # whether the target's code runs in a sandbox
     actuation: Actuation | None = None  # where defences change commands
-    defended_tree: DefendedTree | None = None  # instead of the target's own tree
+    defences: Mapping[str, str] = field(default_factory=dict)  # in its tree: name -> digest, as they act
+    defence_files: Mapping[str, bytes] = field(default_factory=dict)  # new and changed files, by path
 
     @property
     def probe_package(self) -> str | None:
@@ -133,18 +134,12 @@ class TargetManifest:
     def import_names(self) -> tuple[str, ...]:
         """The top-level names of the target's modules, which a run must import from its own tree."""
         laid_over = sorted(path for path in self.tree.overlaid_paths if path.endswith(".py"))
-        names = (*self.packages, *(path.partition("/")[0] for path in laid_over))
+        added = sorted(path for path in self.defence_files if path.endswith(".py"))
+        names = (*self.packages, *(path.partition("/")[0] for path in (*laid_over, *added)))
         return tuple(dict.fromkeys(name.removesuffix(".py") for name in names))
-
-    @property
-    def defences(self) -> tuple[str, ...]:
-        """The names of the defences in the tree."""
-        return self.defended_tree.defences if self.defended_tree else ()
 
     @cached_property
     def tree(self) -> SourceTree:
-        if self.defended_tree is not None:
-            return self.defended_tree.tree
         library = self.path.parent.parent
         tree = read_tree(
             self.root, self.file_globs, self.overlay, library=library, any_links=self.is_installed
@@ -158,7 +153,7 @@ class TargetManifest:
                     where=self.path,
                     remedy="correct `root`, `package`, `packages` or `files`, or give the root with --target",
                 )
-        return tree
+        return tree.with_changes(self.defence_files) if self.defence_files else tree
 
     @cached_property
     def compared_channels(self) -> tuple[Channel, ...]:
@@ -197,8 +192,9 @@ class TargetManifest:
 
     @property
     def output_files(self) -> tuple[str, ...]:
-        """The files that a run writes into {out}."""
-        return (self.trace_file, *([self.record_file] if self.record_file else []))
+        """The files of a run in {out}."""
+        named = (self.trace_file, *([self.record_file] if self.record_file else []))
+        return (*named, DEFENCE_REPORT_FILE) if self.defences else named
 
     def run_reads_any(self, paths: Iterable[str]) -> bool:
         """Whether a run reads one of these files, so that its caches depend on it."""

@@ -295,6 +295,7 @@ class ForkingProcess:
             report["stopped"] = early_stop.drive_run(run, job["stop"])
             is_driving = False
             run.write(Path(job["out"]))
+            run_once.write_defence_report(job)
             if observations is not None:
                 report["libraries"] = run_once.new_modules_outside_packages(
                     modules_before, self.start_message["packages"]

@@ -122,6 +122,7 @@ def run_job(job: dict[str, Any]) -> None:
             run_module(job["module"], job["args"])
         else:
             report["stopped"] = run_to_terminal_hazard(job)
+        write_defence_report(job)
     except BaseException as err:
         report |= describe_failure(err, job["tree"], job["probe"])
     if function_recorder:
@@ -190,6 +191,13 @@ def run_to_terminal_hazard(job: dict[str, Any]) -> bool:
     stopped: bool = load_neighbour("early_stop").drive_run(stepped, job["stop"])
     stepped.write(Path(job["out"]))
     return stopped
+
+
+def write_defence_report(job: dict[str, Any]) -> None:
+    """Write what the defences of the tree did beside the target's own files, if there are any."""
+    if job["defences"]:
+        module, file = job["defences"]
+        Path(job["out"], file).write_text(json.dumps(sys.modules[module].report()), encoding="utf-8")
 
 
 def call_at_first_activation(probe: Any, note: Callable[[], None]) -> None:

@@ -107,7 +107,7 @@ def _check_size(size: int, where: Path) -> None:
 
 def _growing_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tuple[str, bytes]]:
     head = folder.head
-    manifest = workspace.manifest(head.target)
+    manifest = workspace.manifest_of(head)
     digests = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]
     meta = {
         "schema": BUNDLE_SCHEMA,
@@ -133,7 +133,7 @@ def _growing_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iter
 
 def _bundle_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tuple[str, bytes]]:
     yield from _growing_parts(workspace, folder, engine)
-    manifest = workspace.manifest(folder.head.target)
+    manifest = workspace.manifest_of(folder.head)
     yield f"manifest/{manifest.path.name}", read_bounded(manifest.path)
     tree = manifest.tree
     for path, data in tree.files.items():

@@ -33,7 +33,7 @@ def test_a_defence_has_what_its_file_says(toycar: Workspace) -> None:
     assert (defence.role, defence.kind, defence.priority) == (Role.DRIVER, Kind.MONITOR, 0.0)
     assert defence.lets_go_when == "not abs(error) > 2.0"
     assert defence.model_parameters == ("lowest_brake",)
-    assert toycar.defence("gas_limit").acts_when == "gap_read < 40.0"
+    assert toycar.defence("pedal_limit").acts_when == "gap_read < 45.0"
 
 
 def test_the_digest_covers_file_and_model(toycar: Workspace) -> None:

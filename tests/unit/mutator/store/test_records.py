@@ -9,7 +9,15 @@ import pytest
 
 from mutator._common.hashing import canonical_json
 from mutator.errors import CheckFailed, MutatorError
-from mutator.model import AgainstGolden, ObservedActivation, Outcome, Record, RunError, Status
+from mutator.model import (
+    AgainstGolden,
+    DefenceActivity,
+    ObservedActivation,
+    Outcome,
+    Record,
+    RunError,
+    Status,
+)
 from mutator.store import run_progress
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import RECORDS_SCHEMA, load_records, record_as_json
@@ -44,6 +52,11 @@ def test_a_line_equals_asdict(record: MakeRecord) -> None:
     for one in (record(), replace(record(), activation=activation), replace(record(), error=error)):
         expected = asdict(one)
         assert (expected.pop("against_golden"), expected.pop("golden_hazards")) == (None, ())
+        assert [expected.pop(name) for name in ("t_back", "ended_disengaged", "defences")] == [
+            None,
+            False,
+            (),
+        ]
         assert canonical_json(record_as_json(one)) == canonical_json(expected)
 
 
@@ -146,3 +159,18 @@ def test_progress_counts_complete_lines_as_they_arrive(
     writer.append(asdict(record("c" * 16)))
     progress = tail.poll()
     assert (progress.done, progress.per_s, progress.remaining_s) == (3, 0.5, 2.0)
+
+
+def test_what_defences_did_is_read_as_written(tmp_path: Path, record: MakeRecord) -> None:
+    brake = DefenceActivity(
+        name="brake",
+        first=1.0,
+        last=2.5,
+        activations=2,
+        steps=30,
+        conflicts=1,
+        commands=(("gas", 0.2, 0.0), ("brake", 0.5, 1.0)),
+    )
+    first = record("a" * 16, defences=(brake, replace(brake, name="limit", commands=())))
+    write(tmp_path, "0001-gw0.jsonl", first)
+    assert load_records(tmp_path) == {"a" * 16: first}
