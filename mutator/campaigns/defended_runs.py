@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bounded
 from mutator._common.confined_files import not_plain_error, path_below
 from mutator._common.files import make_folder, write_atomic
 from mutator.campaigns.plan_freezing import collect_target_facts
@@ -89,7 +90,7 @@ def _freeze(workspace: Workspace, undefended: RunFolder, names: tuple[str, ...],
     files: dict[str, FileDigest] = {}
     for name in _PLAN_FILES:
         if name in ledger.files:
-            data = path_below(undefended.path, name).read_bytes()
+            data = read_bounded(path_below(undefended.path, name), MOST_EXPERIMENT_DATA_BYTES)
             make_folder(path_below(out, name).parent)
             write_atomic(path_below(out, name), data)
             files[name] = FileDigest.of_bytes(data)

@@ -259,8 +259,8 @@ def _print_defended_runs(terminal: Terminal, summary: "Summary") -> None:
     """Print what came of the campaign with each of its sets of defences."""
     for name, defended in summary.defended.items():
         counts = ", ".join(f"{outcome} {count}" for outcome, count in defended.outcomes.items())
-        done = f"{defended.done} of {defended.planned} experiments done, {defended.ran} now"
-        terminal.print_text(f"with {name}: {counts}; {done}")
+        progress = f"{defended.done} of {defended.planned} experiments done, {defended.ran} now"
+        terminal.print_text(f"with {name}: {counts}; {progress}")
         for note in (defended.provisional_note, defended.reuse_note, defended.proof_note):
             if note:
                 terminal.print_text(f"  {note}")
