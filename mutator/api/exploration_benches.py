@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.execution.bench import Bench
 from mutator.execution.bench_opening import finishing, opened_bench
 from mutator.execution.distributor_choice import Distributor
+from mutator.explore.challengers import challenging_fault, is_challenger, name_with_form, seed_number
 from mutator.explore.envelope_files import delete_envelopes, write_envelopes
 from mutator.explore.exploration import Exploration
 from mutator.explore.exploration_replay import ExplorationReplay
@@ -103,9 +104,19 @@ def experiment_builder(selected_target: SelectedTarget, reading: str) -> BuildEx
         fault = selected_target.fault(spec, value=magnitude, seed=seed, reading=reading, beyond=True)
         return explored_fault(fault, selected_target.manifest)
 
-    def build(plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float) -> Experiment:
+    def formed_fault(plane: ExploredPlane, magnitude: float | None, duration_s: float, form: str) -> Fault:
+        step_s = selected_target.manifest.step_s
+        if is_challenger(form):
+            fault = fault_of(plane.spec, magnitude, plane.seed)
+            return challenging_fault(fault, form, duration_s=duration_s, step_s=step_s, seed=plane.seed)
+        fault = fault_of(plane.spec, magnitude, plane.seed + seed_number(form))
+        return replace(fault, spec=name_with_form(plane.spec, form)) if form else fault
+
+    def build(
+        plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float, form: str = ""
+    ) -> Experiment:
         return builder.build(
-            fault_of(plane.spec, magnitude, plane.seed),
+            formed_fault(plane, magnitude, duration_s, form),
             plane.scenario,
             start_s,
             hold_s=duration_s,

@@ -4,14 +4,15 @@ from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 
 from mutator._common.argument_checks import check_number, check_whole_number
-from mutator._common.message_text import spelling_suggestion
+from mutator._common.message_text import describe_choices, spelling_suggestion
 from mutator.api.scenario_choice import ScenarioLike, concrete_scenario_of
 from mutator.api.target_and_fault_selection import SelectedTarget, TriggerLike, context_or_parsed_trigger
-from mutator.campaigns.exploration_section import ExploredPlane
+from mutator.campaigns.exploration_section import CHALLENGER_KINDS, MOST_SEEDS, ExploredPlane
 from mutator.config.units import UNITS
 from mutator.errors import MutatorError
+from mutator.explore.challengers import challenger_names
 from mutator.explore.lattice import durations_between
-from mutator.explore.plane_building import magnitudes_by_sign
+from mutator.explore.plane_building import can_be_challenged, has_random_numbers, magnitudes_by_sign
 from mutator.families.family import argument_of
 from mutator.faults.fault_specs import Variant
 from mutator.limits import MOST_LIMIT_OR_TIME
@@ -27,13 +28,18 @@ def chosen_planes(
     duration_count: int,
     longest_s: float,
     seed: int,
+    reading: str = "",
+    seeds: int = 1,
+    challengers: Sequence[str] = (),
 ) -> Iterator[ExploredPlane]:
     """Yield a plane for each variant that the names choose, sign of its values, scenario and start.
 
+    `seeds` is for faults that have random numbers, `challengers` (kinds) for those that can be challenged.
     MutatorError for a name, scenario or start that does not exist.
     """
     check_whole_number("points", min(magnitude_count, duration_count), least=1)
     check_whole_number("seed", seed)
+    _check_seeds_and_challengers(seeds, challengers)
     workspace, manifest = selected_target.workspace, selected_target.manifest
     check_number("longest_s", longest_s, least=manifest.step_s)
     check_number("longest_s", -longest_s, least=-MOST_LIMIT_OR_TIME)
@@ -46,6 +52,8 @@ def chosen_planes(
     ]
     for spec, variant in _chosen_variants(selected_target, names):
         unit = UNITS[variant.draw.unit].symbol if variant.draw and variant.draw.unit else ""
+        has_seeds = has_random_numbers(variant, reading, selected_target.models)
+        is_challenged = can_be_challenged(variant, reading)
         for magnitudes in _magnitudes(spec, variant, magnitude_count):
             for scenario in scenarios:
                 concrete = concrete_scenario_of(workspace, scenario)
@@ -60,7 +68,19 @@ def chosen_planes(
                         unit=unit,
                         durations_s=list(durations),
                         seed=seed,
+                        seeds=seeds if has_seeds else 1,
+                        challengers=tuple(challenger_names(challengers, seeds)) if is_challenged else (),
                     )
+
+
+def _check_seeds_and_challengers(seeds: int, challengers: Sequence[str]) -> None:
+    check_whole_number("seeds", seeds, least=1)
+    if seeds > MOST_SEEDS:
+        raise MutatorError(f"{seeds}", argument="seeds", expected=f"at most {MOST_SEEDS}")
+    for kind in challengers:
+        if kind not in CHALLENGER_KINDS:
+            expected = describe_choices(CHALLENGER_KINDS)
+            raise MutatorError(repr(kind), argument="challengers", expected=expected)
 
 
 def _magnitudes(spec: str, variant: Variant, count: int) -> list[list[float]]:

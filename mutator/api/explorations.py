@@ -24,13 +24,19 @@ from mutator.api.target_and_fault_selection import (
     WorkspaceLike,
     open_workspace,
 )
-from mutator.campaigns.exploration_section import STRATEGIES, ExplorationSection, ExploredPlane
+from mutator.campaigns.exploration_section import (
+    CHALLENGER_KINDS,
+    STRATEGIES,
+    ExplorationSection,
+    ExploredPlane,
+)
 from mutator.errors import MutatorError
 from mutator.execution.session_summary import Summary
 from mutator.explore.finding_search import Finding, dominated_share
 from mutator.store.run_progress import ProgressCallback
 
 DEFAULT_POINTS, DEFAULT_LONGEST_S, DEFAULT_OBSERVE_S = 51, 15.0, 15.0
+DEFAULT_CHALLENGERS: Sequence[str] = CHALLENGER_KINDS
 _ENVELOPE_PURPOSE = "How large and how long faults may be before a hazard follows."
 _SEARCH_PURPOSE = "Which faults cause hazards, and how small and how short they can be."
 _T = TypeVar("_T")
@@ -67,6 +73,8 @@ def envelope(
     observe_s: float = DEFAULT_OBSERVE_S,
     search: int = 120,
     validation: int = 86,
+    seeds: int = 3,
+    challengers: Sequence[str] = DEFAULT_CHALLENGERS,
     budget_s: float | None = None,
     target: str | None = None,
     campaign: str | Path | None = None,
@@ -91,6 +99,9 @@ def envelope(
     * `longest_s`: the longest duration. `observe_s`: how long the drive must go on after a fault to count as
       without hazard.
     * `search`: the most runs of a plane's search; `validation`: the cells that are drawn, 0 for none.
+    * `seeds`: how often each cell is driven if the fault has random numbers.
+    * `challengers`: errors that change, which must be survived where the constant one is: `alternating`,
+      `ramp`, `noise`, `glitch`.
     * `budget_s`: begin no batch after this time. The same call in the same folder goes on.
     * `campaign`: take target, canary and limits from a campaign.
     * `seed`: of the runs, and of what validation and proof draw. `reading`, `workers`, `engine`, `reuse`,
@@ -115,6 +126,9 @@ def envelope(
         duration_count=points,
         longest_s=longest_s,
         seed=seed,
+        reading=values["reading"],
+        seeds=seeds,
+        challengers=_listed(challengers),
     )
     section = ExplorationSection(
         planes=list(planes), observe_s=float(observe_s), search=search, validation=validation

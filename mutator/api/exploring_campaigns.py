@@ -70,6 +70,9 @@ def explore_campaign(
         duration_count=request.points if is_envelope else SEARCHED_DURATIONS,
         longest_s=request.longest_s,
         seed=seed,
+        reading=values["reading"],
+        seeds=request.seeds if is_envelope else 1,
+        challengers=request.challengers if is_envelope else (),
     )
     section = ExplorationSection(
         planes=list(planes),

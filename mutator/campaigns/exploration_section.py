@@ -7,9 +7,12 @@ from mutator._common.yaml_dataclasses import pydantic_mapping_config, yaml_metad
 from mutator.config.yaml_files import YamlRecord
 from mutator.limits import MOST_LIMIT_OR_TIME
 
+ChallengerKind = Literal["alternating", "ramp", "noise", "glitch"]
 MOST_PLANES = 10_000
 STRATEGIES = ("planes", "random")
+MOST_SEEDS = 100
 _MOST_POINTS = 200
+CHALLENGER_KINDS: tuple[ChallengerKind, ...] = ("alternating", "ramp", "noise", "glitch")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +51,20 @@ class ExploredPlane:
     )
     unit: str = field(default="", metadata=yaml_metadata("The unit of the magnitudes; empty without one."))
     seed: int = field(default=0, metadata=yaml_metadata("The seed of the runs.", ge=0, lt=2**63))
+    seeds: int = field(
+        default=1,
+        metadata=yaml_metadata(
+            "How many seeds of its random numbers the fault has in each cell.", ge=1, le=MOST_SEEDS
+        ),
+    )
+    challengers: tuple[str, ...] = field(
+        default=(),
+        metadata=yaml_metadata(
+            "The errors that change, by name, which must be survived where the constant one is. Empty if the "
+            "fault is not challenged.",
+            strict=False,
+        ),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,6 +163,23 @@ class ExplorationRequest:
             "none.",
             ge=0,
             le=100_000,
+        ),
+    )
+    seeds: int = field(
+        default=3,
+        metadata=yaml_metadata(
+            "Of `envelope`: with how many seeds a fault that has random numbers is driven in each cell. The "
+            "cell is without hazard only if all these runs are.",
+            ge=1,
+            le=MOST_SEEDS,
+        ),
+    )
+    challengers: tuple[ChallengerKind, ...] = field(
+        default=CHALLENGER_KINDS,
+        metadata=yaml_metadata(
+            "Of `envelope`: errors that change, which must be survived where a constant error of the same "
+            "size is: with `alternating` sign, a `ramp`, `noise`, a repeated `glitch`. `[]`: none.",
+            strict=False,
         ),
     )
     strategy: Literal["planes", "random"] = field(

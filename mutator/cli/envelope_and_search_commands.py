@@ -118,6 +118,18 @@ def envelope(
             "86 without a hazard show that at most 5 % are hazardous, 436 that at most 1 % are.",
         ),
     ] = 86,
+    seeds: Annotated[
+        int,
+        typer.Option(min=1, max=100, metavar="N", help="Drive each cell N times if its fault is random."),
+    ] = 3,
+    are_challenged: Annotated[
+        bool,
+        typer.Option(
+            "--challengers/--no-challengers",
+            help="Drive errors that change, as large as the constant ones that are survived: with "
+            "alternating sign, a ramp, noise, a repeated glitch.",
+        ),
+    ] = True,
     budget_s: Annotated[
         float | None,
         typer.Option("--budget-s", min=0, metavar="SECONDS", help="Begin no batch after this time."),
@@ -138,8 +150,9 @@ def envelope(
 
     For each fault, scenario and start, a search finds the border between faults that are survived and
     faults that are not, by magnitude and duration. A validation then drives faults that were drawn from those
-    called survived.
+    called survived. What is called survived must also survive challengers: errors that change.
     """
+    from mutator.api.explorations import DEFAULT_CHALLENGERS
     from mutator.api.explorations import envelope as find_envelopes
     from mutator.cli.progress_display import campaign_progress
 
@@ -155,6 +168,8 @@ def envelope(
             longest_s=longest_s,
             observe_s=observe_s,
             validation=validation,
+            seeds=seeds,
+            challengers=DEFAULT_CHALLENGERS if are_challenged else (),
             budget_s=budget_s,
             campaign=campaign,
             workers=usable_cores() if workers is None else workers,

@@ -9,6 +9,7 @@ from typing import Any
 
 from mutator.campaigns.exploration_section import ExploredPlane
 from mutator.explore.cell_results import CellResult, CellState, Drive
+from mutator.explore.challenges import ChallengedBound, survived_durations, survived_lines
 from mutator.explore.lattice import Cell
 from mutator.explore.plane_exploration import PlaneExploration, Validation
 from mutator.explore.plane_map import Line
@@ -112,10 +113,7 @@ class Envelope:
         """Return the longest duration up to which all of a line are without hazard; None if the shortest is
         not.
         """
-        count = next(
-            (j for j, state in enumerate(self.cells[line]) if not state.is_without_hazard),
-            len(self.cells[line]),
-        )
+        count = survived_durations(self.cells[line])
         return self.durations_s[count - 1] if count else None
 
     def shortest_hazardous_s(self, line: int) -> float | None:
@@ -142,15 +140,30 @@ class Envelope:
         if duration_s is not None and duration_s > self.durations_s[-1]:
             return None
         count = self.columns_up_to(duration_s)
-        survived = None
-        for magnitude, line in zip(self.magnitudes, self.cells, strict=True):
-            longer = line[count:] if duration_s is None else ()
-            if not all(state.is_without_hazard for state in line[:count]) or any(
-                state.is_hazardous for state in longer
-            ):
-                break
-            survived = magnitude
-        return survived
+        lines = survived_lines(self.cells, count, with_longer=duration_s is None)
+        return self.magnitudes[lines - 1] if lines else None
+
+    @property
+    def is_challenged(self) -> bool:
+        """Whether the plane has challengers, and bounds that were challenged or will be."""
+        return bool(self.plane.challengers)
+
+    @cached_property
+    def challenges(self) -> list[ChallengedBound]:
+        """What challengers left of each bound; empty if they have not begun."""
+        return self.exploration.challenges.outcomes()
+
+    def challenged(self, duration_s: float | None = None) -> ChallengedBound | None:
+        """Return what challengers left of `largest_survived(duration_s)`; None if it was not challenged."""
+        return next(
+            (c for c in self.challenges if not c.bound.is_duration and c.bound.duration_s == duration_s), None
+        )
+
+    def challenged_longest(self) -> ChallengedBound | None:
+        """Return what challengers left of the longest survived duration of the largest magnitude; None if it
+        was not challenged.
+        """
+        return next((c for c in self.challenges if c.bound.is_duration), None)
 
     def time_to_hazard_s(self, line: int) -> float | None:
         """Return the time to the hazard of the longest fault of a line that was driven to one."""
@@ -186,6 +199,7 @@ class Envelope:
             "start_s": self.drive.start_s,
             "end_s": self.drive.end_s,
             "seed": self.plane.seed,
+            "seeds": self.plane.seeds,
             "unit": self.plane.unit,
             "magnitudes": list(self.plane.magnitudes),
             "durations_s": list(self.durations_s),
@@ -202,6 +216,21 @@ class Envelope:
                 }
                 for validation in self.exploration.validations
             ],
+            "challengers": list(self.plane.challengers),
+            "challenges": [self._challenge_as_json(challenge) for challenge in self.challenges],
+        }
+
+    def _challenge_as_json(self, challenge: ChallengedBound) -> Mapping[str, Any]:
+        """Return a bound before and after its challengers, as cells; and the run that lowers it."""
+        bound = challenge.bound
+        return {
+            "bound": "longest" if bound.is_duration else bound.duration_s or "every duration",
+            "constant": list(bound.cell),
+            "survived": None if challenge.level is None else list(bound.cell_at(challenge.level)),
+            "complete": challenge.is_complete,
+            "challenger": challenge.challenger,
+            "failed": list(challenge.failed) if challenge.failed else None,
+            "experiment": challenge.result.experiment_id if challenge.result else None,
         }
 
 

@@ -3,14 +3,16 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from mutator._common.message_text import counted
+from mutator._common.message_text import SHORT_ID_LENGTH, counted
 from mutator._common.phrase_texts import with_unit
 from mutator._common.table_rendering import TextTable
 from mutator.campaigns.exploration_section import ExploredPlane
+from mutator.explore.challengers import describe_challenger
+from mutator.explore.challenges import TABLE_DURATIONS_S, ChallengedBound
 from mutator.explore.envelope import Envelope
 from mutator.explore.finding_search import Finding
+from mutator.explore.lattice import Cell
 
-TABLE_DURATIONS_S = (0.5, 1.0, 2.0)  # for which the table names the largest magnitude that is survived
 _HEADS = ("fault", "scenario", "from")
 
 
@@ -85,7 +87,7 @@ def _table_row(envelope: Envelope) -> list[str]:
         start_text(envelope),
         *(_survived_text(envelope, duration) for duration in durations),
         _magnitude_text(envelope, last),
-        "-" if longest is None else f"{longest:g} s",
+        _longest_text(envelope, longest),
         "-" if time is None else f"{time:.2f} s",
     ]
 
@@ -93,6 +95,7 @@ def _table_row(envelope: Envelope) -> list[str]:
 def describe_validation(envelope: Envelope) -> str:
     """Return how many cells were driven, and what the validation found."""
     runs = f"{counted(envelope.run_count, 'run')} for {envelope.exploration.map.lattice.size:,} cells"
+    runs += f", each with {envelope.plane.seeds} seeds" if envelope.plane.seeds > 1 else ""
     validation = envelope.validation
     if validation is None:
         return f"{runs}; not validated"
@@ -149,10 +152,54 @@ def _magnitude_text(envelope: Envelope, line: int) -> str:
 
 
 def _survived_text(envelope: Envelope, duration_s: float | None) -> str:
+    if (challenge := envelope.challenged(duration_s)) and challenge.is_lowered:
+        return level_text(envelope, challenge)
     survived = envelope.largest_survived(duration_s)
     if survived is None and envelope.magnitudes != (None,):
         return "none"
     return "-" if survived is None else magnitude_text(envelope, survived)
+
+
+def _longest_text(envelope: Envelope, longest_s: float | None) -> str:
+    if (challenge := envelope.challenged_longest()) and challenge.is_lowered:
+        return level_text(envelope, challenge)
+    return "-" if longest_s is None else f"{longest_s:g} s"
+
+
+def level_text(envelope: Envelope, challenge: ChallengedBound) -> str:
+    """Return up to where challengers are survived: a magnitude or a duration."""
+    if challenge.level is None:
+        return "none"
+    if challenge.bound.is_duration:
+        return f"{envelope.durations_s[challenge.level]:g} s"
+    return magnitude_text(envelope, envelope.magnitudes[challenge.level])
+
+
+def cell_text(envelope: Envelope, cell: Cell) -> str:
+    """Return the fault of a cell: `2.5 mph for 1 s`."""
+    return f"{magnitude_text(envelope, envelope.magnitudes[cell[0]])} for {envelope.durations_s[cell[1]]:g} s"
+
+
+def describe_challenges(envelope: Envelope) -> list[str]:
+    """Return a sentence for each bound that challengers lowered, or that says why there is none."""
+    if not envelope.is_challenged:
+        return ["not challenged"]
+    if not envelope.exploration.is_complete:
+        return ["not challenged to the end"]
+    lowered = [challenge for challenge in envelope.challenges if challenge.is_lowered]
+    return [describe_challenge(envelope, challenge) for challenge in lowered] or ["survives all challengers"]
+
+
+def describe_challenge(envelope: Envelope, challenge: ChallengedBound) -> str:
+    """Return by what a lowered bound is lowered, and to where."""
+    assert challenge.failed and challenge.result
+    survived = level_text(envelope, challenge)
+    after = "no smaller one survives all challengers" if survived == "none" else f"{survived} survives all"
+    what = challenge.result.hazard or challenge.result.reason or "not survived"
+    failed = f"{cell_text(envelope, challenge.failed)}, {describe_challenger(challenge.challenger)}"
+    run = challenge.result.experiment_id[:SHORT_ID_LENGTH]
+    constant = f"{cell_text(envelope, challenge.bound.cell)} is survived if constant"
+    return f"{constant}, but {failed}, is not ({what}, run {run}); {after}"
 
 
 def fault_text(envelope: Envelope) -> str:

@@ -22,10 +22,11 @@ def reason_of_batch(number: int) -> str:
 
 
 class Proposal(NamedTuple):
-    """A cell to drive. `plane` is the number of its plane."""
+    """A cell to drive. `plane` is the number of its plane, `form` as in `FormOfCell`."""
 
     plane: int
     cell: Cell
+    form: str = ""
 
 
 @dataclass(slots=True)
@@ -53,8 +54,8 @@ class Exploration:
             before = len(batch)
             for plane in order:
                 most = min(share, self.section.batch - len(batch))
-                batch += (Proposal(plane.number, cell) for cell in plane.propose(most))
-                if len(batch) == self.section.batch:
+                batch += (Proposal(plane.number, *form) for form in plane.propose(most))
+                if len(batch) >= self.section.batch:
                     self._next_plane = (plane.number + 1) % len(order)
                     break
             if len(batch) == before:
@@ -65,7 +66,8 @@ class Exploration:
         """Take the record of a proposed experiment."""
         plane = self.planes[proposal.plane]
         duration_s = plane.map.lattice.durations_s[proposal.cell[1]]
-        plane.note(proposal.cell, judge_cell(record, duration_s, plane.drive, self.section.observe_s))
+        result = judge_cell(record, duration_s, plane.drive, self.section.observe_s)
+        plane.note(proposal.cell, result, proposal.form)
 
 
 class BatchProposer(Protocol):

@@ -14,6 +14,7 @@ from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.campaigns.exploration_section import ExplorationSection
 from mutator.errors import MutatorError
 from mutator.explore.cell_results import Drive
+from mutator.explore.challengers import challenger_of, has_expected_shape, name_with_form
 from mutator.explore.envelope import Envelope
 from mutator.explore.exploration import BatchLoop, BatchProposer, Exploration, Proposal, reason_of_batch
 from mutator.explore.finding_search import FindingSearch
@@ -104,6 +105,8 @@ def replay_exploration(folder: RunFolder, manifest: TargetManifest) -> Explorati
 def _check_lattices(section: ExplorationSection, path: Path) -> None:
     """Raise MutatorError for a lattice that no command writes."""
     for plane in section.planes:
+        for name in plane.challengers:
+            challenger_of(name)
         sign = math.copysign(1.0, (*plane.magnitudes, 1.0)[0])
         for values in ([sign * value for value in plane.magnitudes], plane.durations_s):
             if not all(0.0 < a < b < math.inf for a, b in pairwise([*values, sys.float_info.max])):
@@ -210,7 +213,7 @@ class _ReplayedPlan:
     def _key(self, proposal: Proposal) -> _CellKey:
         plane, (line, duration) = self._exploration.section.planes[proposal.plane], proposal.cell
         return (
-            plane.spec,
+            name_with_form(plane.spec, proposal.form),
             plane.magnitudes[line] if plane.magnitudes else None,
             _scenario_key(plane.scenario),
             self._exploration.drives[proposal.plane].start_s,
@@ -222,7 +225,7 @@ class _ReplayedPlan:
 def _key_of_experiment(experiment: Experiment, after_hazard: AfterHazard) -> _CellKey:
     trigger = experiment.trigger
     is_from_time_on = trigger.hold is Hold.FOR and trigger.armed_after_s == 0.0 and not experiment.setting
-    is_from_time_on &= experiment.after_hazard is after_hazard
+    is_from_time_on &= experiment.after_hazard is after_hazard and has_expected_shape(experiment.fault)
     return (
         experiment.fault.spec,
         experiment.fault.value,

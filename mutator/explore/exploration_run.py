@@ -16,10 +16,17 @@ from mutator.targets.manifest import TargetManifest
 
 
 class BuildExperiment(Protocol):
-    """Builds the experiment of a cell: a fault of this magnitude, from `start_s` on for `duration_s`."""
+    """Builds the experiment of a cell: a fault of this magnitude, from `start_s` on for `duration_s`. `form`
+    is another seed of it, or a challenger.
+    """
 
     def __call__(
-        self, plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float
+        self,
+        plane: ExploredPlane,
+        magnitude: float | None,
+        start_s: float,
+        duration_s: float,
+        form: str = "",
     ) -> Experiment: ...
 
 
@@ -97,7 +104,7 @@ class _BenchRun:
         line, duration = proposal.cell
         magnitude = plane.magnitudes[line] if plane.magnitudes else None
         start_s = self._proposer.drives[proposal.plane].start_s
-        return self._build(plane, magnitude, start_s, plane.durations_s[duration])
+        return self._build(plane, magnitude, start_s, plane.durations_s[duration], proposal.form)
 
 
 def check_harness(record: Record) -> None:

@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+from mutator.explore.challengers import CHALLENGED_MODEL
 from mutator.explore.lattice import magnitudes_between
+from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import Variant
 from mutator.model import Fault
 from mutator.targets.manifest import TargetManifest
@@ -28,6 +30,18 @@ def magnitudes_by_sign(variant: Variant, points: int) -> Iterator[list[float]]:
     for largest, sign in ((high, 1), (-low, -1)):
         if largest > 0:
             yield [sign * value for value in magnitudes_between(largest * _SMALLEST_SHARE, largest, points)]
+
+
+def can_be_challenged(variant: Variant, reading: str) -> bool:
+    """Whether all that a variant injects is a constant error with a size and a sign."""
+    injections = variant.injections_in_reading(reading)
+    return variant.draw is not None and all(i.model == CHALLENGED_MODEL for i in injections)
+
+
+def has_random_numbers(variant: Variant, reading: str, models: FaultModels) -> bool:
+    """Whether what a variant injects depends on a seed."""
+    injections = variant.injections_in_reading(reading)
+    return any(param.type == "seed" for i in injections for param in models.get(i.model).params)
 
 
 def explored_fault(fault: Fault, manifest: TargetManifest) -> Fault:

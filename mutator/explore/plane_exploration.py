@@ -1,11 +1,14 @@
-"""The exploration of one plane: search, validation, and repair of what a validation contradicts."""
+"""The exploration of one plane: search, validation, repair of what a validation contradicts, challenges."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from mutator._common.random_streams import random_generator
 from mutator.campaigns.exploration_section import ExplorationSection, ExploredPlane
 from mutator.explore.cell_results import CellResult, CellState, Drive
+from mutator.explore.challengers import is_challenger, seed_form, seed_number
+from mutator.explore.challenges import Bound, ChallengedCell, Challenges, bounds_of
 from mutator.explore.lattice import Cell, Lattice
 from mutator.explore.plane_map import Line, PlaneMap
 from mutator.explore.plane_search import PlaneSearch, cells_with
@@ -23,6 +26,13 @@ class Validation:
     drawn: tuple[Cell, ...]
 
 
+class FormOfCell(NamedTuple):
+    """A cell to drive. `form` is another seed of its fault, or a challenger; empty for the fault itself."""
+
+    cell: Cell
+    form: str = ""
+
+
 @dataclass(slots=True)
 class PlaneExploration:
     """What is driven next in a plane, which depends on its results so far alone.
@@ -36,8 +46,11 @@ class PlaneExploration:
     seed: int
     number: int
     map: PlaneMap = field(init=False)
+    challenges: Challenges = field(init=False)
     validations: list[Validation] = field(default_factory=list)
     _awaited: set[Cell] = field(default_factory=set)
+    _awaited_challenges: set[ChallengedCell] = field(default_factory=set)
+    _results_by_seed: dict[Cell, dict[str, CellResult]] = field(default_factory=dict)
     _repaired_lines: set[int] = field(default_factory=set)
     _search_runs: int = 0
     _is_searching: bool = True
@@ -45,7 +58,9 @@ class PlaneExploration:
 
     def __post_init__(self) -> None:
         magnitudes = tuple(self.plane.magnitudes) or (None,)
-        self.map = PlaneMap(Lattice(magnitudes=magnitudes, durations_s=tuple(self.plane.durations_s)))
+        lattice = Lattice(magnitudes=magnitudes, durations_s=tuple(self.plane.durations_s))
+        self.map = PlaneMap(lattice)
+        self.challenges = Challenges(self.plane.challengers, lattice, self.drive.step_s)
 
     @property
     def decidable(self) -> int:
@@ -56,6 +71,15 @@ class PlaneExploration:
     @property
     def is_complete(self) -> bool:
         """Whether nothing is left to drive."""
+        if not self._is_explored:
+            return False
+        if self.plane.challengers and not self.challenges.bounds:  # they have not begun, if there are any
+            return not any(self._bounds())
+        return not self.challenges.next_cells()
+
+    @property
+    def _is_explored(self) -> bool:
+        """Whether nothing but challenges is left to drive."""
         if self._awaited or (self._is_searching and self.section.validation):
             return False
         if self._is_searching:
@@ -78,18 +102,40 @@ class PlaneExploration:
         states = ((cell, self.map.state(cell)) for cell in validation.drawn)
         return [cell for cell, state in states if state and state.is_failed]
 
-    def propose(self, most: int) -> list[Cell]:
-        """Return at most `most` cells to drive next; none while results are awaited, and at the end."""
-        cells = self._next_cells()[:most]
+    def propose(self, most: int) -> list[FormOfCell]:
+        """Return some cells to drive next, each with all its seeds: at most `most` runs, or those of one
+        cell. None while results are awaited, and at the end.
+        """
+        forms = [seed_form(number) for number in range(self.plane.seeds)]
+        cells = self._next_cells()[: max(1, most // len(forms))]
         self._awaited |= set(cells)
         self._search_runs += len(cells) if self._is_searching else 0
-        return cells
+        if cells or not self._is_explored:
+            return [FormOfCell(cell, form) for cell in cells for form in forms]
+        return self._next_challenges(most)
 
-    def note(self, cell: Cell, result: CellResult) -> None:
-        """Take the result of a proposed cell."""
-        self._awaited.discard(cell)
-        self.map.add(cell, result)
-        self._proposals = None
+    def _next_challenges(self, most: int) -> list[FormOfCell]:
+        if not self.challenges.bounds:
+            self.challenges.bounds = list(self._bounds())
+        cells = [c for c in self.challenges.next_cells() if c not in self._awaited_challenges][:most]
+        self._awaited_challenges |= set(cells)
+        return [FormOfCell(cell, name) for cell, name in cells]
+
+    def _bounds(self) -> Iterable[Bound]:
+        return bounds_of(self.cells(), self.map.lattice, self.decidable) if self.plane.challengers else ()
+
+    def note(self, cell: Cell, result: CellResult, form: str = "") -> None:
+        """Take the result of a proposed cell. It has one of its own once all its seeds have."""
+        if is_challenger(form):
+            self._awaited_challenges.discard((cell, form))
+            self.challenges.results[cell, form] = result
+            return
+        by_seed = self._results_by_seed.setdefault(cell, {})
+        by_seed[form] = result
+        if len(by_seed) == self.plane.seeds:
+            self._awaited.discard(cell)
+            self.map.add(cell, result_of_all_seeds(self._results_by_seed.pop(cell)))
+            self._proposals = None
 
     def _search(self) -> PlaneSearch:
         return PlaneSearch(
@@ -128,3 +174,15 @@ class PlaneExploration:
 
     def _not_proposed(self, cells: Iterable[Cell]) -> list[Cell]:
         return [cell for cell in cells if cell not in self._awaited and cell not in self.map.results]
+
+
+def result_of_all_seeds(results: Mapping[str, CellResult]) -> CellResult:
+    """Return what the runs of a cell say together: it is without hazard only if each is."""
+    ordered = [results[form] for form in sorted(results, key=seed_number)]
+    for state in (CellState.HAZARDOUS, CellState.NOT_DECIDED, CellState.DISENGAGED):
+        for result in ordered:
+            if result.state is state:
+                return result
+    first = ordered[0].margins
+    margins = {name: min(r.margins.get(name, value) for r in ordered) for name, value in first.items()}
+    return replace(ordered[0], margins=margins, is_activated=any(r.is_activated for r in ordered))

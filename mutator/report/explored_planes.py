@@ -2,14 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from mutator._common.phrase_texts import measured_time_text
 from mutator._common.table_rendering import TextTable
 from mutator.errors import MutatorError
+from mutator.explore.challengers import describe_challenger
+from mutator.explore.challenges import TABLE_DURATIONS_S, ChallengedBound
 from mutator.explore.envelope import BoundaryPair, Envelope
 from mutator.explore.envelope_failures import Failure, count_validation, first_failure, hazardous_share
-from mutator.explore.envelope_texts import TABLE_DURATIONS_S, fault_text, magnitude_text, start_text
+from mutator.explore.envelope_texts import (
+    cell_text,
+    fault_text,
+    level_text,
+    magnitude_text,
+    start_text,
+)
 from mutator.explore.exploration_replay import ExplorationReplay, is_exploration, replay_exploration
 from mutator.report.plane_sentences import describe_plane, is_undecided, percent_text
 from mutator.report.search_findings import SearchFindings
@@ -28,6 +36,7 @@ _TABLE_HEADS = (
     "largest tried",
     "up to",
     "hazard after",
+    "challenged",
     "validation",
     "runs of cells",
 )
@@ -36,13 +45,27 @@ NO_PROBABILITY_NOTE = (
     "says how often faults or hazards occur."
 )
 TABLE_NOTE = (
-    "“Survived” is the largest magnitude of a constant error of this kind up to which every cell is called "
-    "without hazard, driven or between runs, at this start in this scenario; an error that changes can be "
-    "worse. “Up to” and “hazard after” are of the largest magnitude: up to which duration all cells are "
-    "called without hazard, and the time from the start of the longest fault to its hazard. “Validation” is "
-    "the last look; the shares of all looks together hold at 95 %. Links open the run that shows the first "
-    "hazard, beside a shorter one without."
+    "“Survived” is the largest magnitude up to which every cell is called without hazard, driven or between "
+    "runs, at this start in this scenario. Cells are of constant errors. Where a fault is challenged, the "
+    "same size was also driven as errors that change: with alternating sign, growing, as noise and as a "
+    "repeated glitch. If one of them is not survived, the largest size that survives all of them stands "
+    "before that of a constant error. Faults whose error has no size with a sign are not challenged. “Up to” "
+    "and “hazard after” are of the largest magnitude: up to which duration all cells are called without "
+    "hazard, and the time from the start of the longest fault to its hazard. “Validation” is the last look; "
+    "the shares of all looks together hold at 95 %. Links open the run that shows the first hazard, beside a "
+    "shorter one without."
 )
+_CHALLENGE_HEADS = (
+    "fault",
+    "scenario",
+    "from",
+    "survived if constant",
+    "survives all challengers",
+    "not survived",
+    "changing how",
+    "what follows",
+)
+_Proof: TypeAlias = Failure | BoundaryPair | ChallengedBound
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,25 +141,41 @@ class ExploredPlanes:
     @property
     def linked_ids(self) -> set[str]:
         """The ids of the experiments to which the table has links."""
-        proofs = (proof for envelope in self.envelopes for proof in _proofs(envelope))
+        proofs = [proof for envelope in self.envelopes for proof in _proofs(envelope)]
+        proofs += [challenge for envelope in self.envelopes for challenge in envelope.challenges]
         return {name for proof in proofs if proof for name in _ids_of(proof)}
+
+    def challenges_table(self, *, with_links: bool) -> TextTable:
+        """Return a row for each bound that challengers lowered."""
+        rows = [
+            _challenge_row(envelope, challenge, with_links=with_links)
+            for envelope in self.envelopes
+            for challenge in envelope.challenges
+            if challenge.is_lowered
+        ]
+        return TextTable(heads=_CHALLENGE_HEADS, rows=rows, right_aligned=range(3, 6))
 
     def table(self, *, with_links: bool) -> TextTable:
         """Return a row for each envelope; with links for the page, not for Markdown."""
         rows = [_row(envelope, with_links=with_links) for envelope in self.envelopes]
-        return TextTable(heads=_TABLE_HEADS, rows=rows, right_aligned=range(3, 10))
+        return TextTable(heads=_TABLE_HEADS, rows=rows, right_aligned=range(3, 11))
 
 
-def _proofs(envelope: Envelope) -> list[Failure | BoundaryPair | None]:
+def _proofs(envelope: Envelope) -> list[_Proof | None]:
     """Return what a row links: the first failure for every duration and for those of the table, and the
-    border of the largest magnitude.
+    border of the largest magnitude; or the challenger that lowers these.
     """
-    failures = [first_failure(envelope, duration) for duration in (None, *TABLE_DURATIONS_S)]
-    return [*failures, envelope.boundary_pair(len(envelope.magnitudes) - 1)]
+    durations = (None, *TABLE_DURATIONS_S)
+    challenges = [*(envelope.challenged(duration) for duration in durations), envelope.challenged_longest()]
+    failures = [first_failure(envelope, duration) for duration in durations]
+    proofs = [*failures, envelope.boundary_pair(len(envelope.magnitudes) - 1)]
+    return [c if c and c.is_lowered else proof for c, proof in zip(challenges, proofs, strict=True)]
 
 
-def _ids_of(proof: Failure | BoundaryPair) -> list[str]:
+def _ids_of(proof: _Proof) -> list[str]:
     """Return the id of the run with a hazard and, if there is one, of its neighbour without."""
+    if isinstance(proof, ChallengedBound):
+        return [proof.result.experiment_id] if proof.result else []
     if isinstance(proof, BoundaryPair):
         return [proof.hazardous.experiment_id, proof.without_hazard.experiment_id]
     neighbour = [proof.neighbour.experiment_id] if proof.neighbour else []
@@ -160,6 +199,7 @@ def _row(envelope: Envelope, *, with_links: bool) -> list[str]:
         magnitude_text(envelope, envelope.magnitudes[last]) if envelope.plane.magnitudes else "-",
         linked[-1],
         "-" if time_s is None else measured_time_text(time_s),
+        _short_challenge(envelope),
         _short_validation(envelope),
         f"{envelope.run_count} of {envelope.exploration.map.lattice.size:,}",
     ]
@@ -168,7 +208,41 @@ def _row(envelope: Envelope, *, with_links: bool) -> list[str]:
 def _longest_text(envelope: Envelope, longest_s: float | None) -> str:
     if not envelope.was_active:
         return "not decided"
-    return "none" if longest_s is None else f"{longest_s:g} s"
+    constant = "none" if longest_s is None else f"{longest_s:g} s"
+    return _with_challenge(envelope, envelope.challenged_longest(), constant)
+
+
+def _with_challenge(envelope: Envelope, challenge: ChallengedBound | None, constant: str) -> str:
+    """Return what survives all challengers before what is survived of a constant error, if it is less."""
+    if challenge is None or not challenge.is_lowered:
+        return constant
+    return f"{level_text(envelope, challenge)} (constant: {constant})"
+
+
+def _short_challenge(envelope: Envelope) -> str:
+    if not envelope.is_challenged:
+        return "no"
+    if not envelope.exploration.is_complete:
+        return "unfinished"
+    lowered = sum(challenge.is_lowered for challenge in envelope.challenges)
+    return f"{lowered} of {len(envelope.challenges)} lowered" if envelope.challenges else "nothing survived"
+
+
+def _challenge_row(envelope: Envelope, challenge: ChallengedBound, *, with_links: bool) -> list[str]:
+    assert challenge.failed and challenge.result
+    failed = cell_text(envelope, challenge.failed)
+    result, time_s = challenge.result, challenge.result.time_to_hazard_s
+    after = "" if time_s is None else f" after {measured_time_text(time_s)}"
+    return [
+        fault_text(envelope),
+        envelope.plane.scenario,
+        start_text(envelope),
+        cell_text(envelope, challenge.bound.cell),
+        level_text(envelope, challenge),
+        _linked(failed, challenge) if with_links else failed,
+        describe_challenger(challenge.challenger),
+        f"{result.hazard}{after}" if result.hazard else result.reason.partition("\n")[0],
+    ]
 
 
 def _survived_text(envelope: Envelope, duration_s: float | None) -> str:
@@ -177,7 +251,8 @@ def _survived_text(envelope: Envelope, duration_s: float | None) -> str:
         return "not decided"
     survived = envelope.largest_survived(duration_s)
     if survived is not None:
-        return magnitude_text(envelope, survived)
+        constant = magnitude_text(envelope, survived)
+        return _with_challenge(envelope, envelope.challenged(duration_s), constant)
     if duration_s is not None and duration_s > envelope.durations_s[-1]:
         return "not tried"
     smallest, count = envelope.cells[0], envelope.columns_up_to(duration_s)
@@ -199,9 +274,9 @@ def _short_validation(envelope: Envelope) -> str:
     return f"{text} (all)" if count.is_census else f"{text} (≤ {percent_text(count.most_hazardous_share)})"
 
 
-def _linked(text: str, proof: Failure | BoundaryPair | None) -> "str | Markup":
-    if proof is None:
+def _linked(text: str, proof: _Proof | None) -> "str | Markup":
+    if proof is None or not (names := _ids_of(proof)):
         return text
     from markupsafe import Markup
 
-    return Markup('<a href="#e={}">{}</a>').format(Markup("&amp;with=").join(_ids_of(proof)), text)
+    return Markup('<a href="#e={}">{}</a>').format(Markup("&amp;with=").join(names), text)

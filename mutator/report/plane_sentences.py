@@ -17,7 +17,13 @@ from mutator.explore.envelope_failures import (
     undecided_cell_count,
     undecided_results,
 )
-from mutator.explore.envelope_texts import fault_text, magnitude_text, start_text
+from mutator.explore.envelope_texts import (
+    describe_challenge,
+    fault_text,
+    level_text,
+    magnitude_text,
+    start_text,
+)
 
 _LEVEL = f"{100 * CONFIDENCE_OF_ALL_LOOKS:g} %, all looks together"
 _MOST_REASON_LENGTH = 100
@@ -37,11 +43,7 @@ def describe_plane(envelope: Envelope, hazards: Mapping[str, str]) -> str:
         fault = f"{fault_text(envelope)}{_up_to_largest(envelope)}"
         text = f"{fault} {_where(envelope)} is not decided: {undecided}."
     else:
-        longest = planned_number_text(envelope.longest_tried_s, "s")
-        text = (
-            f"No hazard of {fault_text(envelope)}{_up_to_largest(envelope)} was found {_where(envelope)}, "
-            f"for up to {longest}."
-        )
+        text = f"{_without_hazard_text(envelope)}."
     if undecided and (failure or disengaged_cells(envelope)):
         text += f" Not decided: {undecided}."
     return " ".join(filter(None, (text, _disengaged_text(envelope), _reach_text(envelope))))
@@ -129,6 +131,7 @@ def _reach_text(envelope: Envelope) -> str:
     """Return how many cells were driven, and what the validation shows of the others."""
     size = envelope.exploration.map.lattice.size
     driven = f"{envelope.run_count:,} of {size:,} cells were driven"
+    driven += f", each with {envelope.plane.seeds} seeds" if envelope.plane.seeds > 1 else ""
     validation = envelope.validation
     if not any(CellState.BETWEEN_WITHOUT in line for line in envelope.cells):
         return f"{driven}, among them each that is called without hazard."
@@ -152,7 +155,6 @@ def _up_to_largest(envelope: Envelope) -> str:
 def _without_hazard_text(envelope: Envelope) -> str:
     """Return up to which magnitude or duration no hazard was found in a plane that has one."""
     fault, where = fault_text(envelope), _where(envelope)
-    longest = planned_number_text(envelope.longest_tried_s, "s")
     if not envelope.plane.magnitudes:
         longest_survived = envelope.longest_survived_s(0)
         if longest_survived is None:
@@ -162,8 +164,25 @@ def _without_hazard_text(envelope: Envelope) -> str:
     if survived is None:
         smallest = f"Not even the smallest magnitude of {fault} {where}"
         return f"{smallest} is called without hazard for every duration"
-    largest = magnitude_text(envelope, survived)
-    return f"No hazard of {fault} of up to {largest} was found {where}, for up to {longest}"
+    return _without_hazard_if_challenged(envelope, magnitude_text(envelope, survived))
+
+
+def _without_hazard_if_challenged(envelope: Envelope, largest: str) -> str:
+    """Return what is left of `largest`, which is survived of a constant error, after its challengers."""
+    fault, where = fault_text(envelope), _where(envelope)
+    longest = f"for up to {planned_number_text(envelope.longest_tried_s, 's')}"
+    challenge = envelope.challenged()
+    if challenge is None or not challenge.is_complete:
+        return f"No hazard of {fault} of up to {largest} was found {where}, {longest}"
+    if not challenge.is_lowered:
+        return f"No hazard of {fault} of up to {largest}, constant or changing, was found {where}, {longest}"
+    least = level_text(envelope, challenge)
+    text = (
+        f"Not even the smallest magnitude of {fault} {where} survives all challengers"
+        if challenge.level is None
+        else f"No hazard of {fault} of up to {least}, constant or changing, was found {where}, {longest}"
+    )
+    return f"{text} ({describe_challenge(envelope, challenge)})"
 
 
 def _failure_text(envelope: Envelope, failure: Failure, hazards: Mapping[str, str]) -> str:

@@ -216,7 +216,7 @@ def another_seed(run: Path) -> None:
 
 def another_draw_of_the_validation(run: Path) -> None:
     batches = batches_of(run)
-    drawn = len(batches) - 1
+    drawn = max(n for n, batch in enumerate(batches) if "~" not in batch[0].fault.spec)
     planned = {e.trigger.hold_s for batch in batches for e in batch}
     hold_s = next(s for s in sorted(filter(None, planned)) if s != batches[drawn][0].trigger.hold_s)
     replace_in_batch(run, drawn, 0, lambda e: replace(e, trigger=replace(e.trigger, hold_s=hold_s)))
@@ -294,6 +294,59 @@ def a_boundary_pair(run: Path) -> None:
     edit_envelopes(run, edit)
 
 
+def challenger_of(run: Path) -> tuple[int, int]:
+    """Return batch and number of the first challenger."""
+    return next(
+        (n, i)
+        for n, batch in enumerate(batches_of(run))
+        for i, experiment in enumerate(batch)
+        if "~" in experiment.fault.spec
+    )
+
+
+def a_challenger_made_hazardous(run: Path) -> None:
+    names = {e.id for batch in batches_of(run) for e in batch if "~" in e.fault.spec}
+    edit_record(
+        run,
+        lambda record: record["outcome"] == "sdc" and record["experiment_id"] in names,
+        outcome="hazard",
+        hazards=[["H3", 1.2]],
+    )
+
+
+def another_challenger(run: Path) -> None:
+    replace_in_batch(
+        run,
+        *challenger_of(run),
+        lambda e: replace(e, fault=replace(e.fault, spec="sensor/lane/shifted~ramp_2")),
+    )
+
+
+def a_challenger_of_another_shape(run: Path) -> None:
+    def forged(experiment: Experiment) -> Experiment:
+        [injection] = experiment.fault.injections
+        params = tuple(sorted({**dict(injection.params), "period": 100.0}.items()))
+        fault = replace(experiment.fault, injections=(replace(injection, params=params),))
+        return replace(experiment, fault=fault)
+
+    replace_in_batch(run, *challenger_of(run), forged)
+
+
+def a_dropped_challenger(run: Path) -> None:
+    batches = batches_of(run)
+    batch, number = challenger_of(run)
+    batches[batch] = [e for i, e in enumerate(batches[batch]) if i != number]
+    write_batches(run, batches)
+
+
+def the_challengers(run: Path) -> None:
+    edit_campaign(run, r'"challengers": \["[a-z0-9_.]+", ', '"challengers": [')
+
+
+def a_challenged_bound(run: Path) -> None:
+    edit_envelopes(run, lambda plane: plane["challenges"][0].update(survived=[0, 0]))
+
+
 def the_exploration(run: Path) -> None:
     edit_campaign(run, r"\nexplore: .*\n", "\n")
 
@@ -334,6 +387,12 @@ FORGERIES = (
     a_validation,
     a_drawn_cell,
     a_boundary_pair,
+    a_challenger_made_hazardous,
+    another_challenger,
+    a_challenger_of_another_shape,
+    a_dropped_challenger,
+    the_challengers,
+    a_challenged_bound,
 )
 
 

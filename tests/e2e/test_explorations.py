@@ -62,7 +62,7 @@ def test_an_envelope_is_an_ordinary_finished_run(toycar: Workspace, tmp_path: Pa
     assert pair and pair.hazardous.hazard == "H3"
     assert envelope.validation and envelope.exploration.failures(envelope.validation) == []
     run = mutator.load_run(tmp_path / "run", workspace=toycar)
-    assert run.seal and run.verify().differences == () and len(run.records) == envelope.run_count
+    assert run.seal and run.verify().differences == ()
     [again] = explore(toycar, tmp_path / "run")
     assert again.as_json() == envelope.as_json()
     assert mutator.load_run(tmp_path / "run", workspace=toycar).seal == run.seal
@@ -87,6 +87,70 @@ def test_shrinking_takes_what_the_envelope_has(toycar: Workspace, tmp_path: Path
     assert "H3" in dict(records[smallest.experiment.id].hazards)
     assert all("H3" not in dict(records[e.id].hazards) for e in smallest.neighbours.values())
     assert mutator.verify(smallest.run, workspace=toycar).passed
+
+
+@pytest.mark.usefixtures("kept_checks")
+def test_what_is_survived_is_challenged(toycar: Workspace, tmp_path: Path) -> None:
+    """Errors that change were driven at each bound, under names of their own; a lowered bound has a run that
+    shows it, and the page links it.
+    """
+    [envelope] = explore(toycar, tmp_path / "run", points=6, validation=0)
+    assert envelope.challenges and envelope.exploration.is_complete
+    run = mutator.load_run(tmp_path / "run", workspace=toycar)
+    names = {run.experiment(name).fault.spec for name in run.records}
+    assert {SPEC, f"{SPEC}~ramp", f"{SPEC}~noise", f"{SPEC}~alternating_0.5s", f"{SPEC}~glitch"} <= names
+    challenges = envelope.exploration.challenges
+    assert len(run.records) == envelope.run_count + len(challenges.results)
+    page = run.report().page.read_text()
+    for challenge in envelope.challenges:
+        cell = challenge.bound.cell if challenge.level is None else challenge.bound.cell_at(challenge.level)
+        assert challenge.level is None or all(
+            result.state is CellState.WITHOUT_HAZARD
+            for (other, _), result in challenges.results.items()
+            if other == cell
+        )
+        if challenge.is_lowered:
+            assert challenge.result and challenge.result.experiment_id in page
+    assert run.verify().differences == ()
+
+
+@pytest.mark.usefixtures("kept_checks")
+def test_challengers_can_be_left_out(toycar: Workspace, tmp_path: Path) -> None:
+    options = {"points": 4, "longest_s": 3.0, "observe_s": 0.5, "validation": 0, "workspace": toycar}
+    [envelope] = mutator.envelope(SPEC, "A", 1, tmp_path / "run", challengers=[], **options)
+    run = mutator.load_run(tmp_path / "run", workspace=toycar)
+    assert envelope.challenges == [] and len(run.records) == envelope.run_count
+    with pytest.raises(mutator.MutatorError, match="'jump'"):
+        mutator.envelope(SPEC, "A", 1, tmp_path / "other", challengers=["jump"], **options)
+
+
+@pytest.mark.usefixtures("kept_checks")
+def test_a_controller_that_gives_up_has_not_survived(toycar: Workspace, tmp_path: Path) -> None:
+    """One that is disengaged once it has steered hard survives errors up to 0.6 m, of the 1 m without."""
+    manifest = toycar.library / "targets" / "toycar.yaml"
+    manifest.write_text(f"{manifest.read_text()}engaged: not ever(abs(wheel_turn) > 0.4)\n")
+    [envelope] = explore(Workspace.find(root=toycar.library.parent), tmp_path / "run", validation=0)
+    states = {state for line in envelope.cells for state in line}
+    assert CellState.DISENGAGED in states and CellState.HAZARDOUS in states
+    assert 0.4 < (envelope.largest_survived() or 0) < 0.65
+    run = mutator.load_run(tmp_path / "run", workspace=toycar)
+    assert "ended with the controller disengaged" in run.report().markdown.read_text()
+    assert run.verify().differences == ()
+
+
+@pytest.mark.usefixtures("kept_checks")
+def test_a_random_fault_is_driven_with_several_seeds(toycar: Workspace, tmp_path: Path) -> None:
+    """Each cell has a run for each, under a name of its own."""
+    path = toycar.library / "faults" / "sensor" / "lane.yaml"
+    path.write_text(path.read_text().replace("model: offset", "model: noise").replace("by_m", "std_m"))
+    [envelope] = mutator.envelope(
+        SPEC, "A", 1, tmp_path / "run", points=3, longest_s=1.0, observe_s=0.5, seeds=2, workspace=toycar
+    )
+    run = mutator.load_run(tmp_path / "run", workspace=toycar)
+    faults = [run.experiment(name).fault for name in run.records]
+    assert {fault.spec for fault in faults} == {SPEC, f"{SPEC}~seed_1"}
+    assert len(faults) == 2 * envelope.run_count and not envelope.is_challenged
+    assert run.verify().differences == ()
 
 
 @pytest.mark.usefixtures("kept_checks")

@@ -28,6 +28,10 @@ _HTML_TEMPLATE = """\
 {% if pictures %}
 {{ table.as_html("plain envelopes") }}
 <p class="quiet">{{ table_note }}</p>
+{% if challenges.rows %}
+<h3>What challengers lowered</h3>
+{{ challenges.as_html("plain envelopes") }}
+{% endif %}
 <ul class="plane-legend">
 <li><i class="dot survived"></i>run without a hazard</li>
 <li><i class="dot failed"></i>run with a hazard</li>
@@ -73,6 +77,8 @@ def panel_of_planes(planes: ExploredPlanes) -> Panel:
     ]
     if planes.envelopes:
         parts += [planes.table(with_links=False).as_markdown(), TABLE_NOTE]
+        if (challenges := planes.challenges_table(with_links=False)).rows:
+            parts += ["### What challengers lowered", challenges.as_markdown()]
         parts.append("A picture of each plane is in `index.html`.")
     pictures = [
         (
@@ -89,6 +95,7 @@ def panel_of_planes(planes: ExploredPlanes) -> Panel:
         no_probability=NO_PROBABILITY_NOTE,
         table=planes.table(with_links=True),
         table_note=TABLE_NOTE,
+        challenges=planes.challenges_table(with_links=True),
         pictures=pictures,
         most_open=_MOST_OPEN_PICTURES,
         more=f"{counted(max(0, len(pictures) - _MOST_OPEN_PICTURES), 'more plane')}",

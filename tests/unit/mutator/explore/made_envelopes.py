@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 from mutator.campaigns.exploration_section import ExplorationSection, ExploredPlane
 from mutator.explore.cell_results import CellResult, CellState, Drive
+from mutator.explore.challengers import is_challenger
 from mutator.explore.envelope import Envelope
-from mutator.explore.lattice import durations_between, magnitudes_between
+from mutator.explore.lattice import Cell, durations_between, magnitudes_between
 from mutator.explore.plane_exploration import PlaneExploration
 from tests.unit.mutator.explore.made_planes import STEP_S, Truth, result_of
 
@@ -30,6 +31,9 @@ def never(magnitude: float, duration_s: float) -> float | None:
     return None
 
 
+FormHolds = Callable[[str, float, float], bool]  # for a form, a magnitude and a duration
+
+
 def envelope_of(
     truth: Truth,
     plane: ExploredPlane = MADE_PLANE,
@@ -40,20 +44,40 @@ def envelope_of(
     observe_s: float = 15.0,
     crashes: Callable[[float, float], bool] = lambda magnitude, duration_s: False,
     without_result: CellState = CellState.NOT_DECIDED,
+    challengers: FormHolds = lambda name, magnitude, duration_s: True,
+    challenger_state: CellState = CellState.HAZARDOUS,
+    seeds_hit: FormHolds = lambda form, magnitude, duration_s: False,
 ) -> Envelope:
     """Explore a plane, up to `most_runs` runs. Those of faults for which `crashes` holds have the state
-    `without_result`.
+    `without_result`. Challengers are survived where `challengers` holds, else they have `challenger_state`;
+    seeds for which `seeds_hit` holds have a hazard.
     """
     section = ExplorationSection(planes=[plane], validation=validation, observe_s=observe_s)
     explored = PlaneExploration(plane=plane, drive=drive, section=section, seed=1, number=0)
     count = 0
     while count < most_runs and (cells := explored.propose(min(8, most_runs - count))):
         count += len(cells)
-        for cell in cells:
+        for cell, form in cells:
             lattice = explored.map.lattice
+            magnitude, duration_s = lattice.magnitudes[cell[0]] or 0.0, lattice.durations_s[cell[1]]
             result = result_of(truth, lattice, cell)
-            if crashes(lattice.magnitudes[cell[0]] or 0.0, lattice.durations_s[cell[1]]):
+            if crashes(magnitude, duration_s):
                 reason = "ValueError: no lead"
                 result = CellResult(state=without_result, experiment_id=str(cell), reason=reason)
-            explored.note(cell, result)
+            if is_challenger(form):
+                result = _challenger_result(
+                    challengers(form, magnitude, duration_s), cell, form, challenger_state
+                )
+            elif seeds_hit(form, magnitude, duration_s):
+                result = _challenger_result(False, cell, form, CellState.HAZARDOUS)
+            explored.note(cell, result, form)
     return Envelope(explored)
+
+
+def _challenger_result(is_survived: bool, cell: Cell, form: str, state: CellState) -> CellResult:
+    name = f"{cell} {form}"
+    if is_survived:
+        return CellResult(state=CellState.WITHOUT_HAZARD, experiment_id=name)
+    if state is not CellState.HAZARDOUS:
+        return CellResult(state=state, experiment_id=name, reason="ValueError: no lead")
+    return CellResult(state=state, experiment_id=name, hazard="H1", time_to_hazard_s=3.0)

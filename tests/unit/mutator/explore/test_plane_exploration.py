@@ -28,7 +28,7 @@ def explore(
     plane: PlaneExploration, truth: Truth, most: int = 16, visit: Callable[[Cell], None] = lambda cell: None
 ) -> None:
     while cells := plane.propose(most):
-        for cell in cells:
+        for cell, _ in cells:
             visit(cell)
             plane.note(cell, result_of(truth, plane.map.lattice, cell))
 

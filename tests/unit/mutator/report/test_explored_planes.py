@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from mutator.explore.envelope import Envelope
 from mutator.report.explored_planes import ExploredPlanes
+from mutator.report.panels.envelopes_panel import panel_of_planes
 from tests.unit.mutator.explore.made_envelopes import MADE_PLANE, envelope_of, line, never
 
 NO_VALUE = replace(MADE_PLANE, spec="sensor/silence/no_data", magnitudes=[], unit="")
@@ -64,3 +65,20 @@ def test_undecided_planes_are_not_called_free_of_hazards() -> None:
     assert planes.describe_all() == text
     both = ExploredPlanes.of_envelopes([safe, envelope_of(never)], {}).describe_all()
     assert both == "No hazard was found in any of the 2 planes."
+
+
+def test_the_table_has_a_bound_before_and_after_its_challengers() -> None:
+    """With the challenger, what follows, and a link to its run; a fault without a size is not challenged."""
+    plane = replace(MADE_PLANE, challengers=("alternating_0.5s",))
+    lowered = envelope_of(line, plane, challengers=lambda name, m, d: m < 1.5 or d < 1.5)
+    cells = row(lowered, with_links=True)
+    assert cells["survived for every duration"].endswith(" m (constant: 3.41 m)</a>")
+    assert cells["for 0.5 s"] == "50 m" and cells["challenged"] == "3 of 5 lowered"
+    planes = ExploredPlanes.of_envelopes([lowered, envelope_of(line, NO_VALUE)], {})
+    [first, *_] = planes.challenges_table(with_links=False).rows
+    assert first[3] == "3.41 m for 10 s" and first[6:] == ["changing its sign every 0.5 s", "H1 after 3.00 s"]
+    challenge = lowered.challenged()
+    assert challenge and challenge.result and challenge.result.experiment_id in planes.linked_ids
+    assert row(envelope_of(line, NO_VALUE))["challenged"] == "no"
+    panel = panel_of_planes(planes)
+    assert "What challengers lowered" in panel.html and "What challengers lowered" in panel.markdown

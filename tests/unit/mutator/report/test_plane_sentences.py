@@ -123,3 +123,31 @@ def test_earlier_looks_are_shown() -> None:
     text = describe_plane_validation(envelope_of(holes, FINE, validation=86))
     assert text.startswith("0 of 86 drawn cells hazardous: at most 4.9 % of the cells")
     assert text.endswith(" 2 looks before found 1 and 1 hazardous cells, whose lines were then searched.")
+
+
+CHALLENGED = replace(MADE_PLANE, challengers=("alternating_0.5s", "noise"))
+
+
+def test_a_bound_that_survives_challengers_is_of_changing_errors_too() -> None:
+    text = sentence(envelope_of(line, CHALLENGED))
+    assert text.startswith(
+        "No hazard of sensor/bias/distance of up to 3.41 m, constant or changing, was found in A from 5 s"
+    )
+
+
+def test_the_sentence_says_what_a_challenger_lowered() -> None:
+    """The size that survives, that of the constant error, and the run that shows the difference."""
+    envelope = envelope_of(line, CHALLENGED, challengers=lambda name, m, d: name == "noise" or m < 1.5)
+    text = sentence(envelope)
+    assert re.match(r"No hazard of sensor/bias/distance of up to 1\.\d+ m, constant or changing, was", text)
+    assert re.search(r"\(3\.41 m for 10 s is survived if constant, but [\d.]+ m for 10 s, changing its", text)
+    assert "sign every 0.5 s, is not (H1, run (" in text and "survives all)" in text
+    none = envelope_of(line, CHALLENGED, challengers=lambda name, m, d: False)
+    assert sentence(none).startswith(
+        "Not even the smallest magnitude of sensor/bias/distance in A from 5 s sur"
+    )
+
+
+def test_the_sentence_says_how_many_seeds_a_cell_has() -> None:
+    text = sentence(envelope_of(line, replace(MADE_PLANE, seeds=3)))
+    assert " cells were driven, each with 3 seeds" in text
