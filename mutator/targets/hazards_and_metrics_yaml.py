@@ -20,7 +20,12 @@ _AGGREGATES = get_args(Aggregate)
 
 
 class HazardModel(StrictModel, title="A hazard"):
-    """A hazard, by its name. Without `when` and `stl`, it is read from the record."""
+    """A hazard, by its name. Without `when` and `stl`, it is read from the record.
+
+    A target with [defences](defence.md) needs a hazard for braking that nothing calls for; otherwise, more
+    braking always wins. For example `{when: accel < -3.5 and gap > 4 * closing, for_s: 0.5}`: braking harder
+    than 3.5 m/s^2 for 0.5 s while the time to collision, `gap / closing`, is above 4 s.
+    """
 
     about: str = Field("", description="What the hazard is.")
     when: str | None = Field(

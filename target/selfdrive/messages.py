@@ -155,11 +155,16 @@ class RadarState:
 
 @dataclass(slots=True)
 class Actuators:
-    """Gas and brake in 0..1, steer torque in -1..1 (left positive)."""
+    """Gas and brake in 0..1, steer torque in -1..1 (left positive).
+
+    The controller sets these three. The others are what a driver or an emergency brake does beside it.
+    """
 
     gas: float = 0.0
     brake: float = 0.0
     steer: float = 0.0
+    extra_deceleration: float = 0.0  # m/s^2, 0..9; the brakes follow the stronger demand
+    brake_pedal: float = 0.0  # 1 if the driver presses the brake pedal, which the controller can read
 
 
 @dataclass(slots=True)

@@ -18,7 +18,15 @@ NEAR = [0.0, 0.3, 0.5 * (3.7 - 1.8), 0.5 * (3.7 + 1.8), 100.0, 200.0]
 NUMBERS = st.one_of(
     *(st.sampled_from([at, np.nextafter(at, -np.inf), np.nextafter(at, np.inf), -at]) for at in NEAR)
 )
-STEPS = st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=1, max_size=40)
+BRAKING = st.sampled_from([-9.0, np.nextafter(-3.5, -np.inf), -3.5, 0.0])
+LEAD_SPEEDS = st.sampled_from([0.0, 0.3, 25.0, 200.0])
+STEPS = st.lists(
+    st.tuples(
+        NUMBERS, NUMBERS, NUMBERS, st.sampled_from([0.0, 0.3, 25.0, 200.0]), BRAKING, st.integers(1, 60)
+    ),
+    min_size=1,
+    max_size=40,
+)
 
 
 @pytest.fixture(scope="module")
@@ -30,18 +38,19 @@ def manifest() -> TargetManifest:
 @given(steps=STEPS)
 @pytest.mark.slow
 def test_manifest_and_checker_find_the_same_hazards(
-    manifest: TargetManifest, steps: list[tuple[float, float, float]]
+    manifest: TargetManifest, steps: list[tuple[float, float, float, float, float, int]]
 ) -> None:
     monitor = HazardMonitor()
-    t = np.arange(len(steps)) * 0.01
-    for at, (d_rel, v_ego, offset) in zip(t, steps, strict=True):
+    rows = [row for *row, repeats in steps for _ in range(repeats)]
+    t = np.arange(len(rows)) / 100
+    for at, (d_rel, v_ego, offset, v_lead, a_ego) in zip(t, rows, strict=True):
         monitor.update(
             GroundTruth(
                 t=float(at),
                 d_rel=d_rel,
                 v_ego=v_ego,
-                v_lead=0.0,
-                a_ego=0.0,
+                v_lead=v_lead,
+                a_ego=a_ego,
                 lateral_offset=offset,
                 heading=0.0,
                 steer_angle=0.0,
@@ -51,9 +60,9 @@ def test_manifest_and_checker_find_the_same_hazards(
                 free_road=d_rel == 200.0,
             )
         )
-    columns = np.array(steps).T
+    columns = np.array(rows).T
     names = [channel.name for channel in manifest.criteria_channels]
-    trace = dict.fromkeys(names, np.zeros(len(steps))) | {"t": t}
-    trace |= dict(zip(("d_rel", "v_ego", "lateral_offset"), columns, strict=True))
+    trace = dict.fromkeys(names, np.zeros(len(rows))) | {"t": t}
+    trace |= dict(zip(("d_rel", "v_ego", "lateral_offset", "v_lead", "a_ego"), columns, strict=True))
     found = dict(judge_run(manifest, trace, {"hazards": {}}).hazards)
     assert found == {name: time for name, time in monitor.first.items() if time is not None}

@@ -42,6 +42,12 @@ def test_every_run_ends_well_and_every_outcome_occurs(rows: list[Row]) -> None:
     assert all(any(row[name] == "1" for row in rows) for name in ("h1", "h2", "h3"))
 
 
+def test_no_run_brakes_harder_than_the_controller_can(rows: list[Row]) -> None:
+    """H4 needs a driver or an emergency brake beside the controller, which no undefended run has."""
+    assert {(row["h4"], row["t_h4"], row["needless_braking"]) for row in rows} == {("0", "", "0.0")}
+    assert min(float(row["margin_h4"]) for row in rows) > 0.0
+
+
 @pytest.mark.parametrize(
     ("fault_type", "alerts"),
     [("jamming", {"can_error", "radar_error"}), ("camera_unavailable", {"model_error"})],

@@ -19,12 +19,20 @@ FORCE_SHARE_PER_BRAKE = 0.3  # full brake decelerates by 3 m/s^2
 BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s; above this, power, not force, limits acceleration
 CREEP_BP = (0.0, 1.5)  # m/s
 CREEP_V = (1.0, 0.0)  # m/s^2 from an idling automatic gearbox
+MOST_EXTRA_DECELERATION = 9.0  # m/s^2; more than this, tyres do not transmit on a dry road
 
 
-def longitudinal_acceleration(speed: float, gas: float, brake: float, grade: float) -> float:
-    """Return the longitudinal acceleration (m/s^2); pedals in 0..1, `grade` in m/s^2, uphill positive."""
+def longitudinal_acceleration(
+    speed: float, gas: float, brake: float, grade: float, extra_deceleration: float = 0.0
+) -> float:
+    """Return the longitudinal acceleration (m/s^2); pedals in 0..1, `grade` in m/s^2, uphill positive.
+
+    The brakes follow the stronger of `brake` and `extra_deceleration` (m/s^2), as a hydraulic brake does that
+    two systems can apply.
+    """
     force = gas * FORCE_SHARE_PER_GAS * (PEAK_FORCE if speed < BASE_SPEED else PEAK_POWER / speed)
-    force -= brake * BRAKE_FORCE * FORCE_SHARE_PER_BRAKE
+    extra = min(extra_deceleration, MOST_EXTRA_DECELERATION) * LONGITUDINAL_MASS
+    force -= max(brake * BRAKE_FORCE * FORCE_SHARE_PER_BRAKE, extra)
     force -= ROLLING_RESISTANCE * LONGITUDINAL_MASS * GRAVITY + DRAG_COEFFICIENT * speed * speed
     force += (interp(speed, CREEP_BP, CREEP_V) - grade) * LONGITUDINAL_MASS
     return force / LONGITUDINAL_MASS
@@ -46,7 +54,9 @@ class Plant:
         """Advance 10 ms by Euler's method: the position with the old speed, then the speed."""
         old = self.speed
         self.position += DT_CTRL * self.lateral.step(actuators.steer, old, curvature)
-        self.acceleration = longitudinal_acceleration(old, actuators.gas, actuators.brake, grade)
+        self.acceleration = longitudinal_acceleration(
+            old, actuators.gas, actuators.brake, grade, actuators.extra_deceleration
+        )
         self.speed = old + DT_CTRL * self.acceleration
         if self.speed <= 0.0:
             self.speed = self.acceleration = 0.0

@@ -35,28 +35,34 @@ _FIRST_CAPACITY = 4096  # initial capacity in rows
 
 
 class TraceRecorder:
-    """The rows of `CHANNELS` and the alerts. Row k is the state after step k."""
+    """The rows of `CHANNELS` and the alerts. Row k is the state after step k.
+
+    `lead` and `alert_bits` (one bit for each of `COUNTED_ALERTS`) are those of the newest row. `was_engaged`
+    says whether the controller has been engaged so far.
+    """
 
     def __init__(self) -> None:
         self.alerts: list[tuple[str, float]] = []  # each time an alert is raised
         self.engaged_from: float | None = None
         self.engaged_to: float | None = None
+        self.was_engaged = False
         self._rows = array("d")  # the newest rows, at least one
         self._earlier_rows = np.empty((len(CHANNELS), _FIRST_CAPACITY))  # earlier rows, by channel
         self._rows_in_table = 0  # rows in the table
         self._alerts_before: tuple[str, ...] = ()
-        self._alert_bits = 0
+        self.alert_bits = 0
+        self.lead = _NO_LEAD
 
     def append(self, truth: GroundTruth, actuators: Actuators, manager: Manager) -> None:
         state, plan, radar_state = manager.controlsd.state, manager.controlsd.plan, manager.radar_state
-        lead = radar_state.lead_one if radar_state else _NO_LEAD
+        lead = self.lead = radar_state.lead_one if radar_state else _NO_LEAD
         t, d_rel, v_ego, v_lead = truth.t, truth.d_rel, truth.v_ego, truth.v_lead
         if state.alerts != self._alerts_before:
             self._note_alerts(state.alerts, t)
         if state.enabled:
             self.engaged_to = t
-            if self.engaged_from is None:
-                self.engaged_from = t
+            if not self.was_engaged:
+                self.was_engaged, self.engaged_from = True, t
         if len(self._rows) >= _MOST_BUFFERED_NUMBERS:
             self._move_rows_to_table()
         self._rows.fromlist(
@@ -68,7 +74,7 @@ class TraceRecorder:
                 *(state.v_ego, state.a_ego, state.v_cruise, state.v_pid),
                 *(plan.v_target, plan.a_target, state.angle_desired),
                 *(_PLAN_SOURCE_CODES[plan.source], _LONG_STATE_CODES[state.long_state]),
-                *(state.enabled, self._alert_bits),
+                *(state.enabled, self.alert_bits),
             ]
         )
 
@@ -102,5 +108,5 @@ class TraceRecorder:
         self.alerts += [
             (name, t) for name in COUNTED_ALERTS if name in alerts and name not in self._alerts_before
         ]
-        self._alert_bits = sum(1 << bit for bit, name in enumerate(COUNTED_ALERTS) if name in alerts)
+        self.alert_bits = sum(1 << bit for bit, name in enumerate(COUNTED_ALERTS) if name in alerts)
         self._alerts_before = alerts

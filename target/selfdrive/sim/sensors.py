@@ -10,10 +10,12 @@ from selfdrive.sim.truth import GroundTruth
 STANDSTILL_SPEED = 0.3  # m/s; below this the speed reads 0 although the wheels turn
 
 # Constant signals, by period in steps: doors closed, seat belt fastened, gear in drive, main switch on.
+_RELEASED_PEDALS = {"PEDAL_GAS": 0, "BRAKE_SWITCH": 0, "BRAKE_PRESSED": 0}
+_PRESSED_BRAKE = {"PEDAL_GAS": 0, "BRAKE_SWITCH": 1, "BRAKE_PRESSED": 1}
 _CONSTANT_SIGNALS = {
     1: {
         "STEER_STATUS": {"STEER_TORQUE_SENSOR": 0, "STEER_STATUS": 0},
-        "POWERTRAIN_DATA": {"PEDAL_GAS": 0, "BRAKE_SWITCH": 0, "BRAKE_PRESSED": 0},
+        "POWERTRAIN_DATA": _RELEASED_PEDALS,
     },
     2: {
         "GEARBOX": {"GEAR_SHIFTER": GEAR_CODE_BY_NAME["drive"]},
@@ -44,10 +46,16 @@ class CarSensors:
         )
         self._standstill = MessagePacker(messages["STANDSTILL"], ("WHEELS_MOVING",), CAR_BUS)
         self._buttons = MessagePacker(messages["SCM_BUTTONS"], ("CRUISE_BUTTONS",), CAR_BUS)
-        self._constant = [(period, _constant_frames(names)) for period, names in _CONSTANT_SIGNALS.items()]
+        constant = [(period, _constant_frames(names)) for period, names in _CONSTANT_SIGNALS.items()]
+        pressed = _constant_frames(_CONSTANT_SIGNALS[1] | {"POWERTRAIN_DATA": _PRESSED_BRAKE})
+        self._constant, self._with_pressed_brake = constant, [(1, pressed), *constant[1:]]
 
-    def measure(self, truth: GroundTruth, button: int, frame: int) -> list[CanFrame]:
-        """Return all frames of step `frame`; `button` is the cruise button held (CruiseButton)."""
+    def measure(
+        self, truth: GroundTruth, button: int, frame: int, brake_pedal: float = 0.0
+    ) -> list[CanFrame]:
+        """Return all frames of step `frame`; `button` is the cruise button held (CruiseButton), `brake_pedal`
+        is 1 while the driver brakes.
+        """
         speed = truth.v_ego if truth.v_ego >= STANDSTILL_SPEED else 0.0
         speed_kph = speed * MS_TO_KPH
         steer_angle = truth.steer_angle
@@ -60,7 +68,7 @@ class CarSensors:
             self._buttons.pack((button,), frame),
             self._standstill.pack((truth.v_ego > 0.0,), frame),
         ]
-        for period, by_counter in self._constant:
+        for period, by_counter in self._with_pressed_brake if brake_pedal else self._constant:
             if frame % period == 0:
                 frames += by_counter[frame // period % _COUNTERS]
         return frames

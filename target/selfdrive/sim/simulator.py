@@ -88,7 +88,8 @@ class Simulator:
         self._advance(t)
         truth = self._observe(t)
         self.hazards.update(truth)
-        measured = self._sensors.measure(truth, self._scenario.button(self.frame), self.frame)
+        button, brake_pedal = self._scenario.button(self.frame), self._actuators.brake_pedal
+        measured = self._sensors.measure(truth, button, self.frame, brake_pedal)
         view = None
         if self.frame % CYCLE == 0:
             shown = self._plant.shown(truth)

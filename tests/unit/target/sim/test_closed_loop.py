@@ -34,7 +34,7 @@ def test_fault_free_runs_have_no_hazard_or_alert(fault_free, name, rows):
     record, trace = fault_free(name).record, fault_free(name).trace
     assert record["engaged_from"] == pytest.approx(1.31, abs=0.02)
     assert record["engaged_to"] == 29.99
-    assert record["hazards"] == {"H1": None, "H2": None, "H3": None}
+    assert record["hazards"] == {"H1": None, "H2": None, "H3": None, "H4": None}
     assert record["alert_events"] == []
     assert np.abs(trace["lateral_offset"]).max() < 0.01
     assert trace["v_cruise"][-1] == pytest.approx(97 / 3.6)

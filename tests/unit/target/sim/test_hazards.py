@@ -12,7 +12,7 @@ def first(truth, *rows):
 
 
 def test_ordinary_driving_has_no_hazard(truth):
-    assert first(truth, {}, {}) == {"H1": None, "H2": None, "H3": None}
+    assert first(truth, {}, {}) == {"H1": None, "H2": None, "H3": None, "H4": None}
 
 
 @pytest.mark.parametrize(
@@ -48,6 +48,43 @@ def test_h2_needs_a_car_that_has_moved(truth):
 def test_h3_is_a_lane_departure(truth, offset, hit):
     """At an offset of more than 0.95 m, a side of the car is outside the lane."""
     assert (first(truth, {"lateral_offset": offset})["H3"] == 0.0) is hit
+
+
+def braking(truth, seconds, **row):
+    """Brake at 3.51 m/s^2 for this long, then release; return the time of H4."""
+    monitor = HazardMonitor()
+    for k in range(200):
+        values = {"d_rel": 50.0, "v_ego": 20.0, "v_lead": 20.0, "a_ego": -3.51} | row
+        values["a_ego"] *= k <= round(100 * seconds)
+        monitor.update(truth(t=k / 100, **values))
+    return monitor.first["H4"]
+
+
+@pytest.mark.parametrize(("seconds", "at"), [(0.49, None), (0.5, 0.5), (1.0, 0.5)])
+def test_h4_is_half_a_second_of_hard_braking(truth, seconds, at):
+    assert braking(truth, seconds) == at
+
+
+@pytest.mark.parametrize(
+    ("row", "hit"),
+    [
+        ({"a_ego": -3.5}, False),
+        ({"d_rel": 40.0, "v_lead": 10.0}, False),
+        ({"d_rel": 40.1, "v_lead": 10.0}, True),
+        ({"d_rel": 1.0, "v_lead": 21.0}, True),
+        ({"d_rel": 200.0, "free_road": True}, True),
+    ],
+)
+def test_h4_needs_braking_that_nothing_calls_for(truth, row, hit):
+    """The time to collision is 4 s at a distance of 40 m and a closing speed of 10 m/s."""
+    assert (braking(truth, 1.0, **row) is not None) is hit
+
+
+def test_a_pause_starts_the_half_second_anew(truth):
+    monitor = HazardMonitor()
+    for k in range(100):
+        monitor.update(truth(t=k / 100, d_rel=50.0, v_ego=20.0, v_lead=20.0, a_ego=-4.0 * (k != 40)))
+    assert monitor.first["H4"] == 0.91
 
 
 def test_only_the_first_time_is_recorded(truth):

@@ -47,6 +47,27 @@ def test_brake_and_grade():
     assert free - longitudinal_acceleration(15.0, 0.0, 0.0, 1.0) == pytest.approx(1.0)
 
 
+def test_extra_deceleration_brakes_up_to_its_limit():
+    """A driver or an emergency brake brakes beside the controller; the stronger demand counts."""
+
+    def braking(brake, extra):
+        free = longitudinal_acceleration(15.0, 0.0, 0.0, 0.0)
+        return free - longitudinal_acceleration(15.0, 0.0, brake, 0.0, extra)
+
+    assert braking(0.0, 6.0) == pytest.approx(6.0)
+    assert braking(1.0, 6.0) == pytest.approx(6.0)
+    assert braking(1.0, 2.0) == pytest.approx(3.0)
+    assert braking(0.0, 12.0) == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize("extra", [0.0, -1.0, float("nan")])
+def test_without_extra_deceleration_the_brake_alone_counts(extra):
+    for k in range(100):
+        speed, brake = 0.4 * k, 0.01 * k
+        alone = longitudinal_acceleration(speed, 0.1, brake, 0.3)
+        assert longitudinal_acceleration(speed, 0.1, brake, 0.3, extra) == alone
+
+
 def test_creep():
     """The idling engine accelerates the car at 1 m/s^2 at rest and not at all at 1.5 m/s. Rolling resistance
     is subtracted."""

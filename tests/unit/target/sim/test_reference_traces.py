@@ -76,7 +76,7 @@ def test_a_run_agrees_with_its_recording(read_recording, run_once, name):
     assert result.trace["engaged"][published].astype(bool).tolist() == enabled.tolist()
     set_speed = result.trace["v_cruise"][published] * 3.6
     assert set_speed[enabled] == pytest.approx(column("vCruise")[enabled])
-    assert result.record["hazards"] == {"H1": None, "H2": None, "H3": None}
+    assert result.record["hazards"] == {"H1": None, "H2": None, "H3": None, "H4": None}
     assert result.record["alert_events"] == []
 
 

@@ -37,7 +37,7 @@ def test_a_run_writes_a_trace_and_a_record(run, scenarios):
     assert record["trace_digest"] == hashlib.sha256((folder / "trace.npz").read_bytes()).hexdigest()
     assert record["engaged_from"] == pytest.approx(1.31, abs=0.02)
     assert record["engaged_to"] == 1.49
-    assert record["hazards"] == {"H1": None, "H2": None, "H3": None}
+    assert record["hazards"] == {"H1": None, "H2": None, "H3": None, "H4": None}
     assert record["alerts"] == []
 
 

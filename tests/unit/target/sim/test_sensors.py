@@ -49,6 +49,15 @@ def test_every_message_has_its_period_and_counter(truth):
             assert counters == [k % 4 for k in range(len(counters))], name
 
 
+def test_the_controller_reads_a_pressed_brake_pedal(truth):
+    """Only the pedals' message differs, and nothing differs while the pedal is released."""
+    released, pressed = (CarSensors().measure(truth(v_ego=20.0), 0, 3, pedal) for pedal in (0.0, 1.0))
+    assert released == CarSensors().measure(truth(v_ego=20.0), 0, 3)
+    [(before, after)] = [pair for pair in zip(released, pressed, strict=True) if pair[0] != pair[1]]
+    assert [read(CAR, [frame])["POWERTRAIN_DATA"]["BRAKE_PRESSED"] for frame in (before, after)] == [0, 1]
+    assert read(CAR, [after])["POWERTRAIN_DATA"]["COUNTER"] == 3
+
+
 def radar(truth, road=None, **values):
     frames = RadarSensor(road or Road(None, None)).measure(truth(**values))
     return read(RADAR, frames)["TRACK_15"]

@@ -122,7 +122,7 @@ def test_the_record_has_hazards_and_alerts(s1):
     record = simulator.result().record
     trace = simulator.result().trace
     hit = trace["t"][np.argmax(trace["d_rel"] <= 0.0)]
-    assert record["hazards"] == {"H1": hit, "H2": None, "H3": None}
+    assert record["hazards"] == {"H1": hit, "H2": None, "H3": None, "H4": None}
     assert record["alerts"] == [{"name": "fcw", "t": 1.0}]
     assert [event["t"] for event in record["alert_events"]] == [1.0, 3.0, 5.0, 7.0, 9.0]
     assert (record["engaged_from"], record["engaged_to"]) == (1.31, 9.99)
@@ -152,3 +152,26 @@ def test_a_result_can_be_taken_before_the_end(s1):
     simulator.step()
     assert (early.record["steps"], len(early.trace["t"])) == (10, 10)
     assert simulator.result().record["steps"] == 11
+
+
+def test_h4_needs_a_brake_command_beyond_full_brake(s1):
+    """The brake message holds four times full brake, and the plant follows it; full brake alone is no H4."""
+    for counts, first in ((256, None), (1000, 0.5)):
+        script = Script(lambda step, counts=counts: (0, counts, 0))
+        assert drive(s1, script, 80).result().record["hazards"]["H4"] == (
+            first and pytest.approx(first, abs=0.05)
+        )
+
+
+def test_a_driver_brakes_beside_the_controller(s1):
+    """The brake acts from the next step on, and the pedal is on the bus then."""
+    script = Script()
+    simulator = drive(s1, script, 20)
+    simulator._actuators.extra_deceleration, simulator._actuators.brake_pedal = 6.0, 1.0
+    simulator.step()
+    simulator.step()
+    braking = simulator.result().trace["a_ego"][-3:]
+    assert braking == pytest.approx([-0.17, -6.17, -0.17], abs=0.02)
+    pedals = [[f.data for f in frames if f.address == 380] for _, frames, _ in script.steps[-3:]]
+    assert pedals[0][0][4:7] != pedals[1][0][4:7]
+    assert pedals[0][0][:1] == pedals[1][0][:1]
