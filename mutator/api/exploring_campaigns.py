@@ -1,7 +1,9 @@
 """Campaigns that explore: results decide which experiments follow."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mutator.api.benches import bench_values, distributor_of_cluster, warn_of_end
 from mutator.api.exploration_benches import (
@@ -26,6 +28,93 @@ from mutator.store.run_progress import ProgressCallback
 from mutator.workspace import Workspace
 
 
+@dataclass(frozen=True, kw_only=True)
+class ExploringCampaign:
+    """A campaign that explores, with its planes. `values` are those of the bench on which it runs."""
+
+    workspace: Workspace
+    campaign: Campaign
+    selected_target: SelectedTarget
+    values: Mapping[str, Any]
+    section: ExplorationSection
+
+    @classmethod
+    def of_campaign(
+        cls, workspace: Workspace, campaign: Campaign, *, reading: str | None = None, seed: int | None = None
+    ) -> "ExploringCampaign":
+        """Return the campaign with its planes; MutatorError for a fault, scenario or start that does not
+        exist.
+        """
+        request = campaign.exploration_request
+        assert request is not None
+        seed = campaign.seed if seed is None else seed
+        selected_target, values = bench_values(
+            workspace, target=None, campaign=campaign.path, reading=reading or campaign.reading, seed=seed
+        )
+        is_envelope = request.goal == "envelope"
+        planes = chosen_planes(
+            selected_target,
+            [selection.spec_pattern for selection in campaign.fault_selections],
+            _scenarios_of(workspace, campaign, selected_target, seed),
+            request.starts,
+            magnitude_count=request.points if is_envelope else SEARCHED_MAGNITUDES,
+            duration_count=request.points if is_envelope else SEARCHED_DURATIONS,
+            longest_s=request.longest_s,
+            seed=seed,
+            reading=values["reading"],
+            seeds=request.seeds if is_envelope else 1,
+            challengers=request.challengers if is_envelope else (),
+        )
+        section = ExplorationSection(
+            planes=list(planes),
+            goal=request.goal,
+            strategy=request.strategy,
+            budget=request.budget,
+            observe_s=request.observe_s,
+            search=request.search,
+            validation=request.validation,
+            batch=request.batch,
+        )
+        return cls(
+            workspace=workspace,
+            campaign=campaign,
+            selected_target=selected_target,
+            values={**values, "name": campaign.name, "about": campaign.purpose},
+            section=section,
+        )
+
+    def run(
+        self,
+        out: Path,
+        *,
+        workers: int,
+        engine: str | None = None,
+        reuse: bool,
+        cluster: str | None,
+        insecure_network: bool,
+        progress: ProgressCallback | None,
+    ) -> Run:
+        """Run it, or resume it."""
+        with opened_exploration(
+            self.selected_target,
+            self.values,
+            self.section,
+            out,
+            workers=workers,
+            engine=engine,
+            reuse=reuse,
+            distributor=distributor_of_cluster(cluster, insecure_network=insecure_network),
+            progress=progress,
+        ) as bench:
+            reading = self.values["reading"]
+            if self.section.goal == "envelope":
+                explore_envelopes(bench, self.section, self.selected_target, reading, within_budget(None))
+            else:
+                search_findings(bench, self.section, self.selected_target, reading)
+        warn_of_end(bench.summary)
+        return Run(RunFolder.open(out), self.workspace, bench.summary)
+
+
 def explore_campaign(
     workspace: Workspace,
     campaign: Campaign,
@@ -41,8 +130,6 @@ def explore_campaign(
     progress: ProgressCallback | None,
 ) -> Run:
     """Run a campaign that explores, or resume it. `refused` are given arguments that do not apply."""
-    request = campaign.exploration_request
-    assert request is not None
     planned_choices = ("only", "exclude", "limit", "shard", "series_mb")
     refused = [*refused, *(name for name in planned_choices if getattr(choices, name) is not None)]
     if refused:
@@ -52,55 +139,16 @@ def explore_campaign(
             expected="a campaign whose experiments can be planned",
             remedy=f"leave out `{refused[0]}`",
         )
-    seed = campaign.seed if choices.seed is None else choices.seed
-    selected_target, values = bench_values(
-        workspace,
-        target=None,
-        campaign=campaign.path,
-        reading=choices.reading or campaign.reading,
-        seed=seed,
-    )
-    is_envelope = request.goal == "envelope"
-    planes = chosen_planes(
-        selected_target,
-        [selection.spec_pattern for selection in campaign.fault_selections],
-        _scenarios_of(workspace, campaign, selected_target, seed),
-        request.starts,
-        magnitude_count=request.points if is_envelope else SEARCHED_MAGNITUDES,
-        duration_count=request.points if is_envelope else SEARCHED_DURATIONS,
-        longest_s=request.longest_s,
-        seed=seed,
-        reading=values["reading"],
-        seeds=request.seeds if is_envelope else 1,
-        challengers=request.challengers if is_envelope else (),
-    )
-    section = ExplorationSection(
-        planes=list(planes),
-        goal=request.goal,
-        strategy=request.strategy,
-        budget=request.budget,
-        observe_s=request.observe_s,
-        search=request.search,
-        validation=request.validation,
-        batch=request.batch,
-    )
-    with opened_exploration(
-        selected_target,
-        {**values, "name": campaign.name, "about": campaign.purpose},
-        section,
+    exploring = ExploringCampaign.of_campaign(workspace, campaign, reading=choices.reading, seed=choices.seed)
+    return exploring.run(
         out,
         workers=workers,
         engine=engine,
         reuse=reuse,
-        distributor=distributor_of_cluster(cluster, insecure_network=insecure_network),
+        cluster=cluster,
+        insecure_network=insecure_network,
         progress=progress,
-    ) as bench:
-        if is_envelope:
-            explore_envelopes(bench, section, selected_target, values["reading"], within_budget(None))
-        else:
-            search_findings(bench, section, selected_target, values["reading"])
-    warn_of_end(bench.summary)
-    return Run(RunFolder.open(out), workspace, bench.summary)
+    )
 
 
 def _scenarios_of(

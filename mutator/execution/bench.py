@@ -250,6 +250,7 @@ class Bench:
         self._checks.read(self.path, self._plan.golden_runs)
         self._session = self._open_session(folder)
         self._read_records()
+        self._session.note_stored(self._stored_records)
         self._progress.note_stored(self._stored_records.values())
         self._progress.note_planned(self.experiment_count)
 

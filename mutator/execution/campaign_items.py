@@ -11,7 +11,7 @@ import pytest
 
 from mutator._common.files import raising_disk_full
 from mutator.errors import DiskFull, MutatorError, PytestItemFailed, ResourceShortage
-from mutator.execution.item_running import ItemRunner
+from mutator.execution.item_running import FinishedItems, ItemRunner
 from mutator.execution.listed_items import ItemListing, ListedItem
 from mutator.execution.worker_problems import describe_problem, reported_error
 
@@ -23,7 +23,7 @@ class ItemSource(ABC):
     """A campaign, as the items of its file need it in this process."""
 
     def __init__(self) -> None:
-        self._runner: ItemRunner | None = None
+        self._runner: ItemRunner | FinishedItems | None = None
         self._has_failed = False
         self.collected_path: Path | None = None  # by which pytest came to the file
 
@@ -32,10 +32,10 @@ class ItemSource(ABC):
     def listing(self) -> ItemListing: ...
 
     @abstractmethod
-    def _begin(self) -> ItemRunner:
+    def _begin(self) -> ItemRunner | FinishedItems:
         """Return the runner of this process, once the checks have passed."""
 
-    def ensure_runner(self) -> ItemRunner:
+    def ensure_runner(self) -> ItemRunner | FinishedItems:
         """Return the runner of this process; the first call may run the checks before the campaign.
 
         If they fail, the first item fails with the reason, and the others are skipped.
@@ -62,7 +62,7 @@ class CampaignItem(pytest.Item):
 
 
 class ExperimentItem(CampaignItem):
-    """One experiment, or the experiments of a chunk of a large plan."""
+    """One experiment, the experiments of a chunk of a large plan, or the planes of a location."""
 
     def __init__(self, *, listed: ListedItem, source: ItemSource, **keywords: Any) -> None:
         super().__init__(**keywords)

@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from mutator._common.cache_layout_and_pruning import campaign_runs_folder, prune_campaign_runs
 from mutator._common.confined_files import path_below
@@ -45,6 +46,8 @@ class CampaignOptions:
     hazard_fails: bool = False
     workers: int = 0
     packages: tuple[str, ...] = ()  # of a distributor of another package
+    cluster: str | None = None  # of a run that deals its work itself
+    insecure_network: bool = False
 
 
 @contextmanager
@@ -56,11 +59,10 @@ def _remarks_fail_nothing() -> Iterator[None]:
 
 
 class FileRun(ItemSource):
-    """The experiments of a file in the process that is no worker. `out` is their run folder; None: below the
-    cache.
-    """
+    """What a file asks for, in the process that is no worker. `out` is the run folder; None: in the cache."""
 
     must_reach_hazard = True  # whether a run without a canary shows nothing without a hazard
+    deals_work = False  # whether it hands out its work itself, to a cluster too
 
     def __init__(
         self,
@@ -74,49 +76,59 @@ class FileRun(ItemSource):
         super().__init__()
         self.path, self.out = path, out
         self._workspace, self._options, self._notify = workspace, options, notify
-        self._items: SessionItems | None = None
         self.failure: MutatorError | None = None  # why it could not begin
-        self._open = ExitStack()
+        self._has_begun = False
 
     @property
     def session(self) -> Session | None:
-        """The session, once it has begun."""
-        return self._items.session if self._items else None
+        """The session, once it has begun; None for one that has none."""
+        return None
 
     @cached_property
     def listing(self) -> ItemListing:
-        """All experiments of the file."""
+        """All items of the file."""
         try:
             with _remarks_fail_nothing():
-                return self._list_experiments()
+                return self._list_items()
         except MutatorError as err:
             return ItemListing(problem=str(err))
 
     @abstractmethod
-    def _list_experiments(self) -> ItemListing: ...
+    def _list_items(self) -> ItemListing: ...
 
     @abstractmethod
-    def _open_session(self, out: Path) -> SessionItems:
-        """Open the run folder and run the checks; `_open` ends what was opened."""
+    def _begin_in(self, out: Path) -> None:
+        """Open the run folder and run the checks."""
+
+    @abstractmethod
+    def _items_start(self, name: str) -> ItemsStart:
+        """Return what the xdist worker `name` needs, once it has begun."""
 
     @abstractmethod
     def _default_run_folder(self) -> Path:
         """Return a folder below the cache for this plan of these sources: an edit of any begins a new run."""
 
+    @abstractmethod
+    def _finish(self, *, is_stopped: bool) -> Summary | None: ...
+
+    def result_lines(self) -> Sequence[str]:
+        """Return what the summary of a finished run begins with."""
+        return ()
+
     def begin(self) -> None:
         """Open the run folder and run the checks, unless it was done; MutatorError if they fail."""
         if self.failure is not None:
             raise self.failure
-        if self._items is None:
+        if not self._has_begun:
             try:
                 self.out = self.out or self._default_run_folder()
                 with _remarks_fail_nothing():
-                    self._items = self._open_session(self.out)
+                    self._begin_in(self.out)
             except BaseException as err:
                 if isinstance(err, MutatorError):
                     self.failure = err
-                self._open.close()
                 raise
+            self._has_begun = True
 
     def start_for_worker(self, name: str) -> ItemsStart:
         """Return what an xdist worker needs, or why it can run nothing."""
@@ -124,29 +136,20 @@ class FileRun(ItemSource):
             self.begin()
         except MutatorError as err:
             return ItemsStart(problem=str(err))
-        assert self._items is not None
-        return self._items.start_for(self._items.session.start_of_worker(name))
-
-    def _begin(self) -> ItemRunner:
-        self.begin()
-        assert self._items is not None
-        return self._items.start_here()
+        return self._items_start(name)
 
     def finish(self, *, is_stopped: bool) -> Summary | None:
         """End what has begun; return its summary, None if nothing has begun. If `is_stopped`, run no more.
 
         A part of a campaign has no tables and no seal: these come when all experiments have a result.
         """
-        if self._items is None:
+        if not self._has_begun or self.out is None:
             return None
-        session = self._items.session
         try:
-            self._items.close(self._runner, is_stopped=is_stopped)
             with _remarks_fail_nothing():
-                return session.finish(tables_of_part=False)
+                return self._finish(is_stopped=is_stopped)
         finally:
-            self._open.close()
-            if campaign_runs_folder() in session.folder.path.parents:
+            if campaign_runs_folder() in self.out.parents:
                 prune_campaign_runs()
 
     def _key_of_sources(self, inputs: RunInputs) -> list[object]:
@@ -155,7 +158,49 @@ class FileRun(ItemSource):
         return [inputs.digest_by_source(), harness_digest(), versions, self._workspace.sandbox]
 
 
-class CampaignRun(FileRun):
+class SessionRun(FileRun):
+    """The experiments of a file, each an item of one session."""
+
+    def __init__(self, *arguments: Any, **keywords: Any) -> None:
+        super().__init__(*arguments, **keywords)
+        self._items: SessionItems | None = None
+        self._open = ExitStack()
+
+    @property
+    def session(self) -> Session | None:
+        """The session, once it has begun."""
+        return self._items.session if self._items else None
+
+    @abstractmethod
+    def _open_session(self, out: Path) -> SessionItems:
+        """Open the run folder and run the checks; `_open` ends what was opened."""
+
+    def _begin_in(self, out: Path) -> None:
+        try:
+            self._items = self._open_session(out)
+        except BaseException:
+            self._open.close()
+            raise
+
+    def _items_start(self, name: str) -> ItemsStart:
+        assert self._items is not None
+        return self._items.start_for(self._items.session.start_of_worker(name))
+
+    def _begin(self) -> ItemRunner:
+        self.begin()
+        assert self._items is not None
+        return self._items.start_here()
+
+    def _finish(self, *, is_stopped: bool) -> Summary:
+        assert self._items is not None
+        try:
+            self._items.close(self._runner, is_stopped=is_stopped)
+            return self._items.session.finish(tables_of_part=False)
+        finally:
+            self._open.close()
+
+
+class CampaignRun(SessionRun):
     """A campaign."""
 
     def _open_session(self, out: Path) -> SessionItems:
@@ -185,7 +230,7 @@ class CampaignRun(FileRun):
     def _frozen_run(self) -> RunFolder | None:
         return RunFolder.open(self.out) if self.out is not None and RunFolder.exists(self.out) else None
 
-    def _list_experiments(self) -> ItemListing:
+    def _list_items(self) -> ItemListing:
         folder, places = self._frozen_run, SpecPlaces(self._workspace, load_campaign(self.path))
         if folder is not None:
             positions = folder.planned_positions()

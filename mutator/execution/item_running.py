@@ -19,29 +19,31 @@ from mutator.store.run_folder import RunFolder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ItemsStart(PickledValue):
-    """What a process needs to run items of a campaign, once its checks have passed.
-
-    `pending` are positions of experiments without a final record; `unproved` are ids of the equivalence
-    check's sample that have not run on the reference engine. `problem` is why nothing can run, if so.
-    """
-
-    worker: WorkerStart | None = None
-    pending: frozenset[int] = frozenset()
-    unproved: frozenset[str] = frozenset()
-    has_forked: bool = False  # whether the run folder has an experiment that needs the proof
-    expectation: Expectation | None = None  # of all experiments
-    expectation_by_id: Mapping[str, Expectation] = field(default_factory=dict)
-    replay_options: tuple[str, ...] = ()  # with which a user's command finds library and target
-    problem: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ItemEnding:
     """Why an item fails, if it does, and why its experiments were left out, if all were."""
 
     problems: Sequence[str] = ()
     reason_left_out: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ItemsStart(PickledValue):
+    """What a process needs to run items of a campaign, once its checks have passed.
+
+    `pending` are positions of experiments without a final record; `unproved` are ids of the equivalence
+    check's sample that have not run on the reference engine. `problem` is why nothing can run, if so; with
+    `endings`, nothing has to.
+    """
+
+    worker: WorkerStart | None = None
+    pending: frozenset[int] = frozenset()
+    unproved: frozenset[str] = frozenset()
+    endings: Mapping[str, ItemEnding] = field(default_factory=dict)  # of items whose work is done, by name
+    has_forked: bool = False  # whether the run folder has an experiment that needs the proof
+    expectation: Expectation | None = None  # of all experiments
+    expectation_by_id: Mapping[str, Expectation] = field(default_factory=dict)
+    replay_options: tuple[str, ...] = ()  # with which a user's command finds library and target
+    problem: str = ""
 
 
 class ItemRunner:
@@ -151,3 +153,14 @@ class ItemRunner:
             patch = folder.read_patch(experiment.id, record) or b""
         options = self._replay_options
         return [describe_unexpected_result(folder, experiment, record, patch, problem, options)]
+
+
+class FinishedItems:
+    """The items of a file whose work is done: how each ends, by its name."""
+
+    def __init__(self, endings: Mapping[str, ItemEnding]) -> None:
+        self._endings = endings
+
+    def run(self, item: ListedItem) -> ItemEnding:
+        """Return how the item ends."""
+        return self._endings[item.name]

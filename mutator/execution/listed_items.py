@@ -155,7 +155,12 @@ def _markers(experiment: Experiment) -> tuple[str, ...]:
     fault, names = experiment.fault, [experiment.scenario, experiment.method.value]
     if experiment.method is Method.GUIDED:
         names.append(experiment.trigger.name.removeprefix(f"{experiment.method.value}/"))
-    return tuple(name for name in (fault.module, fault.fault_type, *names) if _MARKER.fullmatch(name))
+    return tuple(filter(is_marker, (fault.module, fault.fault_type, *names)))
+
+
+def is_marker(name: str) -> bool:
+    """Whether `-m` can select by a name."""
+    return _MARKER.fullmatch(name) is not None
 
 
 def _shortest_ids(ids: Sequence[str]) -> list[str]:

@@ -12,12 +12,12 @@ from mutator.campaigns.regression_files import RegressionFile, load_regressions
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.execution.bench_opening import opened_bench
-from mutator.execution.campaign_runs import FileRun
+from mutator.execution.campaign_runs import SessionRun
 from mutator.execution.listed_items import ItemListing, list_experiments
 from mutator.execution.session_items import SessionItems
 
 
-class RegressionRun(FileRun):
+class RegressionRun(SessionRun):
     """The experiments of a regression file."""
 
     must_reach_hazard = False  # whoever mended a fault expects none
@@ -26,7 +26,7 @@ class RegressionRun(FileRun):
     def _file(self) -> RegressionFile:
         return load_regressions(self.path)
 
-    def _list_experiments(self) -> ItemListing:
+    def _list_items(self) -> ItemListing:
         file = self._file
         with file.source.locating_errors(("target",)):
             manifest = self._workspace.manifest(file.target)

@@ -26,11 +26,7 @@ from mutator.campaigns.run_provenance import (
 from mutator.engines.engine_choice import choose_engine, reason_not_forkable
 from mutator.engines.engine_kinds import REFERENCE
 from mutator.engines.job_folder import ensure_work_folder
-from mutator.errors import (
-    CheckFailed,
-    DiskFull,
-    MutatorError,
-)
+from mutator.errors import CheckFailed, DiskFull, MutatorError
 from mutator.execution.code_recording import RecordingAssignment, build_recording_assignment
 from mutator.execution.earlier_run import EarlierRunUse
 from mutator.execution.finished_outcome_cache import (
@@ -134,7 +130,7 @@ class Session:
             return
         self._earlier_outcome = None
         records = self.folder.records()
-        self._finished_count_before = sum(ending.is_final for ending in endings_of(records))
+        self.note_stored(records)
         selected_ids = self._earlier.selected_ids(self.folder)
         pending_chunks = pending_chunks_of(self.folder, records, selected_ids)
         copies = self._earlier.since or (self.reuse and self.reuse.searches)
@@ -157,10 +153,14 @@ class Session:
         self.pending = pending_chunks
         self._records = None if pending_chunks else records
 
+    def note_stored(self, records: Mapping[str, Record]) -> None:
+        """Note the records of earlier sessions."""
+        self._finished_count_before = sum(ending.is_final for ending in endings_of(records))
+
     def find_work(self) -> None:
         """Find what remains to do in a run whose checks its bench has run."""
         records = self.folder.records()
-        self._finished_count_before = sum(ending.is_final for ending in endings_of(records))
+        self.note_stored(records)
         self.pending = pending_chunks_of(self.folder, records)
         self.proof = equivalence_check.remaining_sampled_experiments(self.folder)
         self.golden_digests = golden_digests(self.folder)

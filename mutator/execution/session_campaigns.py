@@ -2,9 +2,12 @@
 
 import os
 from contextlib import nullcontext
+from pathlib import Path
+from pkgutil import resolve_name
 
 import pytest
 
+from mutator.campaigns.campaign_files import load_campaign
 from mutator.errors import MutatorError
 from mutator.execution.campaign_runs import CampaignOptions, CampaignRun, FileRun
 from mutator.execution.distributor_choice import Distributor, choose_distributor, packages_of_distributor
@@ -15,6 +18,8 @@ from mutator.execution.xdist_controller import ClusterController, StandaloneCont
 from mutator.store.run_progress import ProgressCallback
 from mutator.workspace import Workspace
 
+# made of what is built on benches, so it is named here, and not imported
+_EXPLORATION_RUN = "mutator.api.exploration_items:ExplorationRun"
 _LIBRARY_PARTS = ("campaigns", "targets")  # folders of a library
 
 
@@ -63,14 +68,25 @@ def _campaign_runs(
         hazard_fails=config.getoption("hazard_fails"),
         workers=getattr(config.option, "numprocesses", None) or 0,
         packages=packages_of_distributor(distributor) if distributor else (),
+        cluster=config.getoption("campaign_cluster"),
+        insecure_network=config.getoption("insecure_network"),
     )
     notify = _progress_notifier(config)
     runs: dict[str, FileRun] = {}
     for file in files:
-        kind = RegressionRun if is_regression_file(file) else CampaignRun
-        path = file.resolve() if kind is RegressionRun else workspace.campaign(file).resolve()
+        path = file.resolve() if is_regression_file(file) else workspace.campaign(file).resolve()
+        kind = RegressionRun if is_regression_file(file) else _kind_of_campaign(path)
         runs[os.path.realpath(file)] = kind(path, workspace, options, out=out, notify=notify)
     return runs
+
+
+def _kind_of_campaign(path: Path) -> type[FileRun]:
+    try:
+        explores = load_campaign(path).exploration_request is not None
+    except MutatorError:  # collecting the file names its mistake
+        explores = False
+    kind: type[FileRun] = resolve_name(_EXPLORATION_RUN) if explores else CampaignRun
+    return kind
 
 
 def _workspace(requested: RequestedCampaigns, *, sandbox: bool) -> Workspace:

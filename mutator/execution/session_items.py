@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from mutator.campaigns.expectations import Expectation
 from mutator.errors import MutatorError
-from mutator.execution.item_running import ItemRunner, ItemsStart
+from mutator.execution.item_running import FinishedItems, ItemRunner, ItemsStart
 from mutator.execution.listed_items import (
     MOST_SINGLE_ITEMS,
     ItemListing,
@@ -62,9 +62,9 @@ class SessionItems:
         assignment = session.worker_assignment("main")
         return ItemRunner(session.folder, self.start_for(None), lambda: Worker(session.inputs, assignment))
 
-    def close(self, runner: ItemRunner | None, *, is_stopped: bool) -> None:
+    def close(self, runner: ItemRunner | FinishedItems | None, *, is_stopped: bool) -> None:
         """End the runner of this process, if it has begun; if `is_stopped`, without what remains to prove."""
-        if runner is not None:
+        if isinstance(runner, ItemRunner):
             if not is_stopped:
                 runner.prove_rest()
             self.session.written.add_report(runner.close())

@@ -22,9 +22,13 @@ class SpecPlaces:
 
     def place_of(self, fault: Fault) -> SourcePlace:
         """Return the file and line of a fault's variant."""
-        if fault.spec not in self._place_by_variant:
-            self._place_by_variant[fault.spec] = self._find_place(fault.spec)
-        return self._place_by_variant[fault.spec]
+        return self.place_of_variant(fault.spec)
+
+    def place_of_variant(self, name: str) -> SourcePlace:
+        """Return the file and line of a variant with this full name."""
+        if name not in self._place_by_variant:
+            self._place_by_variant[name] = self._find_place(name)
+        return self._place_by_variant[name]
 
     def _find_place(self, variant: str) -> SourcePlace:
         name, _, variant_name = variant.rpartition("/")

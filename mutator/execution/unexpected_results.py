@@ -27,7 +27,12 @@ def describe_unexpected_result(
     finished = FinishedExperiment(experiment, record, folder.severity_scale)
     row = row_of(result_columns_of(folder), finished)
     sentence = ExperimentSentences.of_run(folder.head).sentence(row, experiment.fault)
-    words = ["mutator", "show", experiment.id[:_SHOWN_ID_LENGTH], "--run", str(folder.path), "--drive"]
-    words += replay_options
     change = patch_without_new_files(patch.decode(errors="replace"))[0].rstrip()  # without the probe
-    return "\n".join([sentence, problem, "", change, "", f"replay: {shlex.join(words)}"])
+    replay = f"replay: {replay_command(folder, experiment.id, replay_options)}"
+    return "\n".join([sentence, problem, "", change, "", replay])
+
+
+def replay_command(folder: RunFolder, experiment_id: str, options: Sequence[str]) -> str:
+    """Return the command that shows the drive of an experiment."""
+    words = ["mutator", "show", experiment_id[:_SHOWN_ID_LENGTH], "--run", str(folder.path), "--drive"]
+    return shlex.join([*words, *options])

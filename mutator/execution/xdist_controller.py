@@ -299,6 +299,8 @@ class ClusterController(StandaloneController):
 
     def _make_file(self, path: Path, parent: pytest.Collector, **more: Any) -> pytest.File:
         run = self._runs[os.path.realpath(path)]
+        if run.deals_work:
+            return super()._make_file(path, parent, **more)
         return ClusterFile.from_parent(parent, path=path, run=run, distributor=self._distributor, **more)
 
 
@@ -336,6 +338,7 @@ def _exit_status(session: pytest.Session, run: FileRun, summary: Summary) -> int
 def _summary_lines(run: FileRun, summary: Summary, title: str) -> list[str]:
     missing = summary.planned - summary.done
     lines = [
+        *run.result_lines(),
         f"{title}{summary.done} of {summary.planned} experiments done, {summary.ran} now",
         summary.reuse_note,
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),

@@ -21,7 +21,7 @@ from mutator.execution.campaign_items import (
     source_of,
 )
 from mutator.execution.golden_facts import GoldenFacts
-from mutator.execution.item_running import ItemRunner, ItemsStart
+from mutator.execution.item_running import FinishedItems, ItemRunner, ItemsStart
 from mutator.execution.listed_items import ItemListing
 from mutator.execution.requested_campaigns import WORKER_INPUT_KEY
 from mutator.execution.worker import WorkerOfProcess
@@ -47,14 +47,16 @@ class WorkerSource(ItemSource):
     def listing(self) -> ItemListing:
         return self._listing
 
-    def ensure_runner(self) -> ItemRunner:
+    def ensure_runner(self) -> ItemRunner | FinishedItems:
         runner = super().ensure_runner()
         while not self.new_goldens.empty():
             assert self._process is not None
             self._process.ensure_worker().add_goldens(self.new_goldens.get())
         return runner
 
-    def _begin(self) -> ItemRunner:
+    def _begin(self) -> ItemRunner | FinishedItems:
+        if self.start.endings:
+            return FinishedItems(self.start.endings)
         if self.start.worker is None:
             raise PytestItemFailed(self.start.problem)
         self._process = WorkerOfProcess(self.start.worker)
@@ -65,7 +67,7 @@ class WorkerSource(ItemSource):
         """Do what remains of the proof, and close the worker's files; return their digests."""
         if self._process is None:
             return {}
-        if self._runner is not None and not is_stopped:
+        if isinstance(self._runner, ItemRunner) and not is_stopped:
             self._runner.prove_rest()
         return self._process.close()
 

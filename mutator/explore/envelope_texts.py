@@ -118,6 +118,13 @@ def findings_table(findings: Sequence[Finding], planes: Sequence[ExploredPlane])
     return TextTable(heads=heads, rows=rows, right_aligned=(4, 5, 6))
 
 
+def describe_finding(finding: Finding, plane: ExploredPlane) -> str:
+    """Return the hazard and the fault that reached it, in one sentence."""
+    spec, scenario, start, hazard, smallest, duration, after, _ = _finding_row(finding, plane)
+    fault = spec if smallest == "-" else f"{spec} {smallest}"
+    return f"{fault} in {scenario} from {start} for {duration}: {hazard} after {after}"
+
+
 def shortest_first(findings: Sequence[Finding], planes: Sequence[ExploredPlane]) -> list[Finding]:
     """Return the findings, those of the shortest faults first."""
     return sorted(findings, key=lambda finding: (_duration_s(finding, planes), finding.plane))
