@@ -13,6 +13,7 @@ from pathlib import Path
 from mutator.errors import MutatorError
 
 EVENTS_FD_VARIABLE = "MUTATOR_EVENTS_FD"
+SMALLEST_FORM_LINK = "smallest form"  # the kind of a link to a run folder and an experiment in it
 MOST_EVENT_TEXT_LENGTH = 500  # characters; so that a line is written in one piece (PIPE_BUF)
 _events_pipe_descriptor: int | None = None
 

@@ -9,6 +9,7 @@ from mutator._common.shipped_files import shipped_folder
 RUNS_FOLDER = Path("runs")
 RUN_HEAD_FILE = "run.json"  # the file that identifies a run folder
 SCRATCH_FOLDER = "work"  # of a run folder, while a command works on it
+SHRUNK_FOLDER = "shrunk"  # beside run folders: those of the smaller forms of their faults
 _LIBRARY_FOLDER = "fault_library"
 _TEMPLATES_FOLDER = "templates"
 
@@ -53,6 +54,13 @@ def run_folders_newest_first(root: Path) -> list[Path]:
     heads = [head for base in bases for head in base.glob(f"*/{RUN_HEAD_FILE}")]
     heads.sort(key=lambda head: (head.stat().st_mtime_ns, str(head)), reverse=True)
     return [head.parent for head in heads]
+
+
+def shrunk_folder(run: Path, experiment_id: str) -> Path:
+    """Return the run folder for the smaller forms of an experiment, by default."""
+    # two levels below runs/, so that the newest run there is still this one
+    beside = run.parent if run.parent.name == SHRUNK_FOLDER else run.parent / SHRUNK_FOLDER
+    return beside / f"{run.name}-{experiment_id}"
 
 
 def _configured_folder(folder: _PathArgument, root: _PathArgument, name: str, variable: str) -> Path | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from mutator._common.argument_checks import check_whole_number
 from mutator._common.confined_files import path_below
 from mutator._common.files import ScratchFolder
+from mutator._common.library_and_run_folder_search import shrunk_folder
 from mutator.api.experiment_results import TraceFrames, trace_frame
 from mutator.api.run_contents import RunContents
 from mutator.api.smallest_form import SmallestForm
@@ -102,9 +103,7 @@ class RunExperiment(StoredExperiment):
         check_engine_is_offered(engine)
         if self.record is None:
             raise self.not_run_error()
-        # two levels below runs/, so that the newest run there is still this one
-        run = self.run.path.resolve()
-        folder = run.parent / "shrunk" / f"{run.name}-{self.id}"
+        folder = shrunk_folder(self.run.path.resolve(), self.id)
         from mutator.api.shrinks import Shrinker
 
         shrinker = Shrinker(self.run, self.experiment, self.record, start)

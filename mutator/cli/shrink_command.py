@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mutator._common.command_progress_events import SMALLEST_FORM_LINK, report_written_file
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.message_text import counted
 from mutator.cli.plan_and_run_commands import WORKERS_DEFAULT_HELP, resume_command
@@ -91,6 +92,7 @@ def shrink(
             )
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; finished experiments are kept; resume: {resume_command()}") from None
+    report_written_file(SMALLEST_FORM_LINK, smallest.run / smallest.experiment.id)
     saved, reason = smallest.save(save) if save is not None else ([], "")
     if as_json:
         paths = [str(path) for path in saved]

@@ -3,6 +3,7 @@
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -17,7 +18,7 @@ from mutator.errors import MutatorError, NotServed
 from mutator.serve.home_live_trial_and_error_pages import form_choices, home_page
 from mutator.serve.http_responses import error_response, media_type_of
 from mutator.serve.job_queue import ServeJobs
-from mutator.serve.job_requests import JobCommand, RequestChecker
+from mutator.serve.job_requests import RequestChecker
 from mutator.serve.json_api import JobApi, ReviewApi, selected_groups
 from mutator.serve.live_and_trial_pages import WatchPages
 from mutator.serve.page_tokens import HOME_PAGE, PageTokens, review_page_name
@@ -53,8 +54,8 @@ class ServedSite:
         runs = [summarize_run(key, path) for key, path in self.runs.folders_by_key().items()]
         return sorted(runs, key=lambda run: run["changed"], reverse=True)
 
-    def _report_address(self, command: JobCommand) -> str | None:
-        key = self.runs.key_of(command.run_folder) if command.run_folder else None
+    def _report_address(self, run: Path) -> str | None:
+        key = self.runs.key_of(run)
         return report_address(key) if key else None
 
 

@@ -78,7 +78,7 @@ def form_choices(workspace: Workspace) -> dict[str, Any]:
     }
     try:
         for names, files in (("scenarios", workspace.scenarios), ("campaigns", workspace.campaigns)):
-            choices[names] = [{"name": name, "about": _title_in_file(path)} for name, path in files.items()]
+            choices[names] = [_described_file(name, path) for name, path in files.items()]
         readings = workspace.readings()
         choices["readings"] = [
             {"name": name, "about": about}
@@ -106,14 +106,18 @@ def form_choices(workspace: Workspace) -> dict[str, Any]:
     return choices
 
 
-def _title_in_file(path: Path) -> str:
-    """Return the title of a scenario's or campaign's file; '' if the file has a format of its own."""
+def _described_file(name: str, path: Path) -> dict[str, Any]:
+    """Return a scenario or campaign, with its title, '' if its file has a format of its own, and whether it
+    explores.
+    """
     try:
         data = load_yaml(path).data
     except MutatorError:
-        return ""
-    about = (data.get("title") or data.get("about")) if isinstance(data, dict) else ""
-    return about.strip() if isinstance(about, str) else ""
+        data = None
+    values = data if isinstance(data, dict) else {}
+    about = values.get("title") or values.get("about")
+    title = about.strip() if isinstance(about, str) else ""
+    return {"name": name, "about": title, "explores": "explore" in values}
 
 
 def _newest_comparable_pair(runs: Sequence[Mapping[str, Any]]) -> tuple[str, str]:

@@ -15,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import IO, Any
 
-from mutator._common.command_progress_events import EVENTS_FD_VARIABLE
+from mutator._common.command_progress_events import EVENTS_FD_VARIABLE, SMALLEST_FORM_LINK
 from mutator.errors import JobAlreadyEnded, MutatorError, NotServed
 from mutator.execution.progress_text import describe_outcomes
 from mutator.serve.http_responses import without_absolute_folders
@@ -106,9 +106,9 @@ class ServeJob:
 
 
 class ServeJobs:
-    """The jobs of a server. `report_at` returns the address of a run's report."""
+    """The jobs of a server. `report_at` returns the address of the report of a run folder."""
 
-    def __init__(self, most_jobs_at_once: int, report_at: Callable[[JobCommand], str | None]) -> None:
+    def __init__(self, most_jobs_at_once: int, report_at: Callable[[Path], str | None]) -> None:
         self._jobs: dict[str, ServeJob] = {}
         self._count = 0
         self._waiting: queue.Queue[ServeJob | None] = queue.Queue()
@@ -259,7 +259,11 @@ class ServeJobs:
         if job.job_command.job_request.kind == "try":
             folder = job.path_by_kind.get("trial")
             return trial_address(Path(folder).name) if folder else None
-        return job.job_command.result_address or self._report_at(job.job_command)
+        if smallest := job.path_by_kind.get(SMALLEST_FORM_LINK):
+            report = self._report_at(Path(smallest).parent)
+            return f"{report}#e={Path(smallest).name}" if report else None
+        command = job.job_command
+        return command.result_address or (self._report_at(command.run_folder) if command.run_folder else None)
 
 
 def _printable_bytes(data: bytes | bytearray) -> str:

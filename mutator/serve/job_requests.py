@@ -5,7 +5,7 @@ A name must be in the library, and an id in a run's plan. No value can be a path
 
 import math
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,6 +13,7 @@ from pydantic import AfterValidator, Field, TypeAdapter
 
 from mutator._common.confined_files import check_only_plain_files
 from mutator._common.cpu_cores import usable_cores
+from mutator._common.library_and_run_folder_search import shrunk_folder
 from mutator._common.message_text import describe_choices, spelling_suggestion
 from mutator.campaigns.campaign_files import load_campaign
 from mutator.campaigns.row_filters import compile_filter
@@ -63,6 +64,14 @@ class StillRequest(StrictModel):
     t: Annotated[FiniteNumber, Field(ge=0, le=1e6)]
 
 
+class ShrinkRequest(StrictModel):
+    """Find the smallest fault with the hazard of an experiment."""
+
+    kind: Literal["shrink"]
+    run: PlainText
+    experiment: ExperimentId
+
+
 class ReportRequest(StrictModel):
     kind: Literal["report"]
     run: PlainText
@@ -83,7 +92,7 @@ class TrialRequest(StrictModel):
 
 
 class CampaignRequest(StrictModel):
-    """Run part of a campaign in the new folder `name`."""
+    """Run part of a campaign in the new folder `name`, or all of one that explores: without `only`."""
 
     kind: Literal["campaign"]
     campaign: PlainText
@@ -95,7 +104,8 @@ class CampaignRequest(StrictModel):
     workers: Annotated[int, Field(ge=1)] | None = None
 
 
-JobRequest = RerunRequest | FilmRequest | StillRequest | ReportRequest | TrialRequest | CampaignRequest
+ExperimentRequest = RerunRequest | FilmRequest | StillRequest | ShrinkRequest
+JobRequest = ExperimentRequest | ReportRequest | TrialRequest | CampaignRequest
 _REQUEST_ADAPTER: TypeAdapter[JobRequest] = TypeAdapter(Annotated[JobRequest, Field(discriminator="kind")])
 
 
@@ -123,6 +133,7 @@ class RequestChecker:
             RerunRequest: self._rerun_command,
             FilmRequest: self._film_command,
             StillRequest: self._still_command,
+            ShrinkRequest: self._shrink_command,
             ReportRequest: self._report_command,
             TrialRequest: self._trial_command,
             CampaignRequest: self._campaign_command,
@@ -142,9 +153,16 @@ class RequestChecker:
         what = f"picture at {request.t:.2f} s"
         return self._experiment_command(request, what, "show", request.experiment, f"--still={request.t:.2f}")
 
-    def _experiment_command(
-        self, request: RerunRequest | FilmRequest | StillRequest, what: str, *arguments: str
-    ) -> JobCommand:
+    def _shrink_command(self, request: ShrinkRequest) -> JobCommand:
+        out = shrunk_folder(self.runs.folder(request.run), request.experiment)
+        if _checked_new_folder(out) != out:
+            raise MutatorError(f"{out.parent.name} is a link", expected="a folder", remedy="remove the link")
+        command = self._experiment_command(
+            request, "smallest form", "shrink", request.experiment, f"--out={out}"
+        )
+        return replace(command, result_address=None)  # known at the end: the result's
+
+    def _experiment_command(self, request: ExperimentRequest, what: str, *arguments: str) -> JobCommand:
         folder = self._existing_run_folder(request.run)
         if request.experiment not in plan_file.experiment_ids(folder):
             raise MutatorError(
@@ -233,9 +251,16 @@ class RequestChecker:
                 expected="a name that no served run has",
                 remedy="choose another name",
             )
+        explores = load_campaign(self.workspace.campaign(request.campaign)).exploration_request is not None
+        if explores and request.only is not None:
+            raise MutatorError(
+                f"a filter for {request.campaign}, which explores",
+                where="only",
+                expected="no filter, because results decide which experiments follow",
+            )
         options = {
             "--out": folder,
-            "--limit": request.limit,
+            "--limit": None if explores else request.limit,
             "--only": request.only,
             "--seed": request.seed,
             "--workers": min(request.workers or usable_cores(), usable_cores()),
@@ -245,7 +270,7 @@ class RequestChecker:
             title=f"{request.campaign} into {request.name}",
             argv=(
                 *("run", request.campaign, *_joined_options(options)),
-                *(("--proportional",) if request.proportional else ()),
+                *(("--proportional",) if request.proportional and not explores else ()),
                 *self._workspace_options(),
             ),
             run_folder=folder,
@@ -275,12 +300,7 @@ class RequestChecker:
         return folder
 
     def _new_folder(self, name: str) -> Path:
-        folder = self.runs.folder_for_new_runs / name
-        if folder.is_symlink():
-            raise MutatorError(f"{name} is a link", expected="a new folder", remedy="choose another name")
-        if folder.is_dir():
-            check_only_plain_files(folder)
-        return folder.resolve()
+        return _checked_new_folder(self.runs.folder_for_new_runs / name)
 
     def _workspace_options(self) -> list[str]:
         workspace = self.workspace
@@ -290,6 +310,15 @@ class RequestChecker:
             "--target": workspace.target,
         }
         return [*_joined_options(options), *(["--sandbox"] if workspace.sandbox else [])]
+
+
+def _checked_new_folder(folder: Path) -> Path:
+    """Return a folder for results, resolved; MutatorError if it is a link or contains links."""
+    if folder.is_symlink():
+        raise MutatorError(f"{folder.name} is a link", expected="a new folder", remedy="choose another name")
+    if folder.is_dir():
+        check_only_plain_files(folder)
+    return folder.resolve()
 
 
 def _joined_options(values_by_option: dict[str, Any]) -> list[str]:

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from mutator._common.confined_files import open_below, path_below
 from mutator._common.folder_locks import is_owner_alive
-from mutator._common.library_and_run_folder_search import RUN_HEAD_FILE
+from mutator._common.library_and_run_folder_search import RUN_HEAD_FILE, SHRUNK_FOLDER
 from mutator.errors import MutatorError, NotServed, UnsafePath
 from mutator.execution.progress_text import stage_title
 from mutator.results.outcome_counting import count_by_outcome_or_status
@@ -32,7 +32,8 @@ SERVED_SUFFIXES_BY_FOLDER: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ServedRuns:
-    """Run folders below `roots`, by key: the folder's name, with `-2`, `-3` and so on for repeated names.
+    """Run folders below `roots`, also those of smallest forms there, by key: the folder's name, with `-2` and
+    so on for repeated names.
 
     A folder keeps its key while the server lives, even after it is deleted: an open page never reads another
     run.
@@ -81,7 +82,10 @@ def _run_folders_in(root: Path) -> list[Path]:
     if RunFolder.exists(root):
         return [root]
     try:
-        inside = sorted(root.glob(f"*/{RUN_HEAD_FILE}"))
+        inside = [
+            *sorted(root.glob(f"*/{RUN_HEAD_FILE}")),
+            *sorted(root.glob(f"{SHRUNK_FOLDER}/*/{RUN_HEAD_FILE}")),
+        ]
     except OSError:
         return []
     folders = [head.parent for head in inside]

@@ -33,9 +33,11 @@
     const time = el("input", { type: "number", min: 0, step: "0.05", value: momentOf(experiment), "aria-label": "Time of the still, in seconds" });
     const pictures = facts.filmed ? [button("Film", "Golden and faulty runs, the whole drive", () => ({ kind: "film" })),
       el("span.still", {}, button("Still", "One image of the golden and faulty runs", () => ({ kind: "still", t: Number(time.value) })), " at ", time, " s")] : [];
+    const hasHazard = experiment.table.text(experiment.row, "outcome") === "hazard";
+    const shrink = hasHazard ? button("Shrink", "Find the smallest fault with the same hazard: some 20 runs", () => ({ kind: "shrink" })) : null;
     const section = el("section.do", { "data-id": id }, el("h3", {}, "Run it here"),
       el("div.row", {}, button("Rerun", "Check that the result is the same", () => ({ kind: "rerun" })),
-        button("Exact plot", "Rerun and record every step of the channels", () => ({ kind: "plot" })), pictures),
+        button("Exact plot", "Rerun and record every step of the channels", () => ({ kind: "plot" })), shrink, pictures),
       status, jobs);
     plot(id, section);
     return section;
@@ -65,8 +67,13 @@
     if (list.dataset.text === text) return;
     list.dataset.text = text;
     list.replaceChildren(...mine.map((job) => el("li", {}, el(`span.job-state.${job.state}`, {}, job.state), ` ${job.title}: ${job.message} `,
-      job.state === "done" ? el("button", { type: "button", onclick: () => location.reload() }, "Show it") : null)));
+      job.state === "done" ? shown(job) : null)));
   }
+
+  /** What shows the result of a job: that of shrinking is an experiment of another run. */
+  const shown = (job) => (job.kind === "shrink" && job.result
+    ? el("a", { href: job.result }, "Show it")
+    : el("button", { type: "button", onclick: () => location.reload() }, "Show it"));
 
   place.addEventListener("filled", (event) => fill(event.detail));
   if (Experiment.open) fill(Experiment.open);

@@ -104,20 +104,25 @@
   function campaignForm({ campaigns }) {
     const name = el("input", { name: "name", required: true, pattern: "[A-Za-z0-9][A-Za-z0-9._\\-]*", title: "letters, digits, dots, hyphens", autocomplete: "off" });
     const campaign = select("campaign", campaigns.map(described), { onchange: suggest });
+    const limit = el("input", { name: "limit", type: "number", min: 1, max: 1000, value: 20, required: true });
+    const only = el("input", { name: "only", placeholder: "scenario == \"S1\"", autocomplete: "off", spellcheck: "false" });
+    const draw = el("select", { name: "draw" }, option("even", "each variant equally often"), option("proportional", "in proportion to the plan"));
     function suggest() {
+      // results decide which experiments of an exploration follow
+      limit.disabled = only.disabled = draw.disabled = campaigns.find((each) => each.name === campaign.value).explores;
       const now = new Date(), two = (n) => String(n).padStart(2, "0");
       name.value = `${campaign.value}-${two(now.getMonth() + 1)}${two(now.getDate())}-${two(now.getHours())}${two(now.getMinutes())}`;
     }
     suggest();
     return form("Run a small campaign", "A sample of a campaign's experiments, spread over its plan.", [
       labelled("Campaign", campaign),
-      labelled("At most", el("input", { name: "limit", type: "number", min: 1, max: 1000, value: 20, required: true }), "experiments"),
-      labelled("Draw", el("select", { name: "draw" }, el("option", { value: "even" }, "each variant equally often"), el("option", { value: "proportional" }, "in proportion to the plan"))),
+      labelled("At most", limit, "experiments; an exploration runs whole"),
+      labelled("Draw", draw),
       labelled("Run folder", name, "next to the other runs"),
-      labelled("Only", el("input", { name: "only", placeholder: "scenario == \"S1\"", autocomplete: "off", spellcheck: "false" }), "a filter; empty: all"),
+      labelled("Only", only, "a filter; empty: all"),
       labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: the campaign's"),
     ], "Run it", (values) => ({
-      kind: "campaign", campaign: values.campaign, name: values.name.trim(), limit: Number(values.limit), proportional: values.draw === "proportional", only: orNull(values.only), seed: numberOrNull(values.seed),
+      kind: "campaign", campaign: values.campaign, name: values.name.trim(), limit: Number(limit.value), proportional: draw.value === "proportional" && !draw.disabled, only: orNull(values.only), seed: numberOrNull(values.seed),
     }), (_, { name: run }) => location.assign(`/live/${encodeURIComponent(run)}`));
   }
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+import mutator
 from mutator.errors import MutatorError
 from mutator.report.panels import figures_panel
 from mutator.serve.job_queue import JobState, ServeJob, ServeJobs
@@ -48,9 +49,27 @@ def experiment(client: Client) -> str:
     return next(plan_file.experiment_ids(client.place / "runs/first"))
 
 
+def test_shrinking_is_a_job_whose_result_is_an_experiment(busy: Client) -> None:
+    """The address is that of the smallest form, in a served run of its own."""
+    workspace = busy.site.workspace
+    with mutator.open_bench(workspace, busy.place / "runs/lane", campaign="small") as bench:
+        experiment = bench.build_experiment("sensor/lane/shifted", "A", 1.0, value=2.5)
+        bench.run([experiment])
+    answer = busy.post("/api/jobs", {"kind": "shrink", "run": "lane", "experiment": experiment.id})
+    job = busy.ended(answer.json["id"])
+    assert job["state"] == "done", busy.get(f"/api/jobs/{job['id']}/log").json["log"]
+    assert "H3" in job["message"] and (job["run"], job["experiment"]) == ("lane", experiment.id)
+    page, _, fragment = job["result"].partition("#")
+    assert page == f"/runs/lane-{experiment.id}/report/index.html"
+    name = fragment.partition("=")[2]
+    shrunk = RunFolder.open(busy.place / "runs/shrunk" / f"lane-{experiment.id}")
+    assert "H3" in dict(shrunk.records()[name].hazards)
+    assert busy.get(page).status == 200
+
+
 def test_the_run_of_a_job_is_complete_and_can_be_compared(busy: Client) -> None:
     assert RunFolder.open(busy.place / "runs/first").is_finished
-    [run] = busy.get("/api/runs").json["runs"]
+    [run] = [run for run in busy.get("/api/runs").json["runs"] if run["key"] == "first"]
     assert (run["key"], run["state"], run["done"]) == ("first", "finished", 2)
     report = busy.get(run["report"])
     assert '<script src="/assets/serve/served.js" defer></script>\n</body>' in report.text

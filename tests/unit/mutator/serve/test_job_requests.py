@@ -129,6 +129,9 @@ def test_requests_become_command_lines(desk: RequestChecker) -> None:
     assert work(desk, kind="plot", **about).argv == ("rerun", experiment, "--trace", *of_run)
     film = f"--video={run}/plots/{experiment}.mp4"
     assert work(desk, kind="film", **about).argv == ("show", experiment, film, *of_run)
+    shrunk = work(desk, kind="shrink", **about)
+    out = f"--out={run.parent}/shrunk/first-{experiment}"
+    assert (shrunk.argv, shrunk.result_address) == (("shrink", experiment, out, *of_run), None)
     still = work(desk, kind="still", t=3, **about)
     assert still.argv == ("show", experiment, "--still=3.00", *of_run)
     assert still.result_address == f"/runs/first/report/index.html#e={experiment}"
@@ -193,3 +196,27 @@ def test_a_job_is_shown_for_its_own_run_only(desk: RequestChecker, toycar: Works
 def test_an_infinite_number_is_refused(desk: RequestChecker) -> None:
     with pytest.raises(ValueError):
         work(desk, **TRY, value=math.inf)
+
+
+def test_a_campaign_that_explores_runs_whole(desk: RequestChecker) -> None:
+    """Its experiments follow from results, so no number and no filter can choose among them."""
+    text = (desk.workspace.library / "campaigns/small.yaml").read_text()
+    text = text[: text.index("faults:")].replace("name: small", "name: explored")
+    canary = "canary: {spec: sensor/lane/shifted, scenario: A, hazard: H3, at_s: 1.0}"
+    explored = f"{text}faults: [{{spec: sensor/lane/shifted}}]\nexplore: {{starts: [1]}}\nseed: 3\n{canary}\n"
+    (desk.workspace.library / "campaigns/explored.yaml").write_text(explored)
+    order = {"kind": "campaign", "campaign": "explored", "name": "new"}
+    words = work(desk, **order, workers=1).argv
+    assert words[:4] == ("run", "explored", f"--out={desk.runs.folder('first').parent}/new", "--workers=1")
+    with pytest.raises(MutatorError, match="a filter for explored, which explores"):
+        work(desk, **order, only="scenario == 'A'")
+
+
+def test_smaller_forms_are_no_link_elsewhere(desk: RequestChecker, tmp_path: Path) -> None:
+    """A run that somebody else made can have a link beside it."""
+    run = desk.runs.folder("first")
+    experiment = next(plan_file.experiment_ids(run))
+    (tmp_path / "elsewhere").mkdir()
+    (run.parent / "shrunk").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(MutatorError, match="shrunk is a link"):
+        work(desk, kind="shrink", run="first", experiment=experiment)
