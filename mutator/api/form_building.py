@@ -22,10 +22,11 @@ _SMALLEST_SHARE = 0.001  # of the experiment's value: the smallest size that is 
 
 @dataclass(frozen=True)
 class FormBuilder:
-    """Builds the forms of one experiment."""
+    """Builds the forms of one experiment; `is_explored` if it is one of an exploration."""
 
     selected_target: SelectedTarget
     original: Experiment
+    is_explored: bool = False
 
     @cached_property
     def sizes(self) -> SizeAxis | None:
@@ -128,8 +129,7 @@ class FormBuilder:
         built = self.selected_target.fault(
             fault.spec, value=value, seed=self.original.seed, reading=fault.reading or None, beyond=True
         )
-        # an exploration decides how long a fault lasts, whatever its spec declares
-        return built if fault.hold is not None else replace(built, hold=None)
+        return explored_fault(built, self.selected_target.manifest) if self.is_explored else built
 
     def _listed_with_signs_of(self, variant: Variant, value: float) -> tuple[float, ...]:
         """Return the values that a spec lists, without those that have another sign than `value`, or whose

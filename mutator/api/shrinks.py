@@ -19,6 +19,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.bench import Bench
 from mutator.execution.bench_opening import finishing, opened_bench
 from mutator.execution.single_run import manifest_of_unchanged_target, rerun_experiment
+from mutator.explore.exploration_replay import is_exploration
 from mutator.explore.fault_forms import Axis, FaultForm, FormSpace
 from mutator.explore.round_numbers import RoundNumbers
 from mutator.explore.shrink_run import golden_values_of, run_shrinking, trigger_start_s
@@ -111,7 +112,7 @@ class Shrinker:
 
     @cached_property
     def _builder(self) -> FormBuilder:
-        return FormBuilder(self._selected_target, self.experiment)
+        return FormBuilder(self._selected_target, self.experiment, is_exploration(self.run.folder))
 
     def _bench_values(self) -> dict[str, Any]:
         campaign = self._campaign
