@@ -499,5 +499,8 @@ def test_a_worse_controller_has_a_smaller_envelope(
     record = runs[1].experiment(finding.experiment_id).record
     assert record and record.hazards
     assert comparison.tables["envelopes"]["became hazardous"].tolist() > [0]
+    page = comparison.write(tmp_path / "compared").page.read_text()
+    assert all(f'class="{name}"' in page for name in ("worse", "border before", "border after"))
+    assert f"<code>{finding.experiment_id[:8]}</code>" in page
     assert mutator.compare(*reversed(runs)).findings(["smaller-envelope"]) == ()
     assert mutator.compare(runs[0], runs[0]).findings(["smaller-envelope"]) == ()

@@ -4,13 +4,13 @@ from markupsafe import Markup
 
 from mutator._common.message_text import counted
 from mutator.explore.envelope_texts import describe_envelope, name_of_plane
+from mutator.figures.plane_drawing import draw_plane
 from mutator.report.explored_planes import (
     NO_PROBABILITY_NOTE,
     TABLE_NOTE,
     ExploredPlanes,
 )
 from mutator.report.panel import Panel, rendered
-from mutator.report.plane_drawing import draw_plane
 from mutator.report.plane_sentences import describe_plane_validation
 from mutator.report.reported_run import ReportedRun
 

@@ -10,11 +10,11 @@ import pytest
 from mutator.explore.cell_results import CellState
 from mutator.explore.envelope import Envelope
 from mutator.explore.lattice import durations_between, magnitudes_between
+from mutator.figures.plane_drawing import draw_plane, draw_two_planes
 from mutator.report.explored_planes import ExploredPlanes
 from mutator.report.panels.envelopes_panel import panel_of_planes
-from mutator.report.plane_drawing import draw_plane
 from tests.unit.mutator.explore.made_envelopes import MADE_PLANE, envelope_of, line, never
-from tests.unit.mutator.explore.made_planes import STEP_S
+from tests.unit.mutator.explore.made_planes import STEP_S, Truth
 
 FINE = replace(
     MADE_PLANE,
@@ -80,3 +80,19 @@ def test_pictures_are_small() -> None:
     panel = panel_of_planes(ExploredPlanes.of_envelopes(envelopes, {}))
     assert panel.html.count("<svg") == 40 and re.search("<summary>28.more planes</summary>", panel.html)
     assert len(panel.html.encode()) < 250_000
+
+
+@pytest.mark.parametrize(("before", "after"), [(never, line), (line, never), (line, line), (never, never)])
+def test_two_planes_are_drawn_over_each_other(before: Truth, after: Truth) -> None:
+    """The border of each that has hazards, and the cells that changed."""
+    svg = draw_two_planes(envelope_of(before), envelope_of(after), "a < b")
+    classes = [path.get("class") for path in ElementTree.fromstring(svg).iter()]
+    assert ("border before" in classes, "border after" in classes) == (before is line, after is line)
+    assert ("worse" in classes) is (after is line and before is never)
+    assert ("better" in classes) is (before is line and after is never)
+
+
+def test_what_a_run_no_longer_decides_is_drawn() -> None:
+    """Cells that the first run calls without hazard, and the second does not say."""
+    svg = draw_two_planes(envelope_of(never), envelope_of(never, most_runs=1), "")
+    assert 'class="lost"' in svg and 'class="border' not in svg
