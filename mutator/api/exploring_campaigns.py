@@ -83,6 +83,15 @@ class ExploringCampaign:
             section=section,
         )
 
+    @property
+    def most_runs(self) -> int:
+        """The most runs of the search and its validations; a repair of a plane can add a few."""
+        section = self.section
+        if section.goal == "find":
+            return section.budget
+        cells = (max(1, len(plane.magnitudes)) * len(plane.durations_s) for plane in section.planes)
+        return sum(min(count, section.search + section.validation) for count in cells)
+
     def run(
         self,
         out: Path,
@@ -130,15 +139,7 @@ def explore_campaign(
     progress: ProgressCallback | None,
 ) -> Run:
     """Run a campaign that explores, or resume it. `refused` are given arguments that do not apply."""
-    planned_choices = ("only", "exclude", "limit", "shard", "series_mb")
-    refused = [*refused, *(name for name in planned_choices if getattr(choices, name) is not None)]
-    if refused:
-        raise MutatorError(
-            f"`{refused[0]}` for campaign {campaign.name}, which explores",
-            argument=refused[0],
-            expected="a campaign whose experiments can be planned",
-            remedy=f"leave out `{refused[0]}`",
-        )
+    refuse_choices(campaign, choices, refused)
     exploring = ExploringCampaign.of_campaign(workspace, campaign, reading=choices.reading, seed=choices.seed)
     return exploring.run(
         out,
@@ -149,6 +150,19 @@ def explore_campaign(
         insecure_network=insecure_network,
         progress=progress,
     )
+
+
+def refuse_choices(campaign: Campaign, choices: Choices, others: Sequence[str] = ()) -> None:
+    """Raise MutatorError for choices, or other given arguments, that do not apply to an exploration."""
+    planned_choices = ("only", "exclude", "limit", "shard", "series_mb")
+    refused = [*others, *(name for name in planned_choices if getattr(choices, name) is not None)]
+    if refused:
+        raise MutatorError(
+            f"`{refused[0]}` for campaign {campaign.name}, which explores",
+            argument=refused[0],
+            expected="a campaign whose experiments can be planned",
+            remedy=f"leave out `{refused[0]}`",
+        )
 
 
 def _scenarios_of(

@@ -15,6 +15,7 @@ import mutator
 from mutator._common.cpu_cores import usable_cores
 from mutator.cli import shell_completion
 from mutator.cli.envelope_printing import print_envelopes
+from mutator.cli.exploration_printing import planned_exploration, print_exploration
 from mutator.cli.github_step import GitHub, GitHubStep, showing_errors
 from mutator.cli.merge_report_clean_commands import print_outcome_counts
 from mutator.cli.plan_printing import print_plan, print_plan_as_json
@@ -95,6 +96,7 @@ def plan(
     """Freeze a campaign's experiments without running any.
 
     Prints the expected time and disk space. `run` with the same folder then runs exactly these experiments.
+    Of a campaign that explores, prints the planes and freezes nothing: results decide what is driven.
     """
     from mutator.api.plans import reasons_not_to_fork
 
@@ -103,6 +105,11 @@ def plan(
     choices = mutator.Choices(
         seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, proportional=proportional
     )
+    command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
+    if (exploring := planned_exploration(workspace, campaign, choices)) is not None:
+        print_exploration(terminal, exploring, as_json=as_json)
+        terminal.print_command("run it:", shlex.join(command))
+        return
     with terminal.show_spinner("planning"):
         new_plan = mutator.plan(campaign, out, choices=choices, workspace=workspace)
     folder = out.resolve()
@@ -113,7 +120,6 @@ def plan(
     print_plan(terminal, new_plan, cost, reason_by_variant)
     # enough to compare by eye; run.json has all digits
     terminal.print_text(f"plan: {short_path(folder / 'plan.csv')} (digest {new_plan.digest[:16]})")
-    command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
     terminal.print_command("run it:", shlex.join(command))
 
 

@@ -47,3 +47,28 @@ def test_an_invalid_plan_is_refused(cli: Cli, root: Path, words: list[str], said
     assert said in answer.err
     assert "Traceback" not in answer.err
     assert not Path("p/run.json").exists()
+
+
+EXPLORED = """\
+schema: campaign/1
+name: explored
+about: How wrong the lane sensor and the distance may be.
+target: toycar
+scenarios: [A]
+faults: [{spec: sensor/lane/shifted}, {spec: sensor/silence/no_data}]
+explore: {starts: [1], points: 4, longest_s: 3, search: 10, validation: 5}
+seed: 3
+canary: {spec: sensor/lane/shifted, scenario: A, hazard: H3, at_s: 1.0}
+"""
+
+
+def test_a_campaign_that_explores_has_planes(cli: Cli, root: Path) -> None:
+    """And the most runs; nothing is frozen, and choices among experiments are refused."""
+    (root / "fault_library/campaigns/explored.yaml").write_text(EXPLORED)
+    answer = cli("plan", "explored", "--out", "run")
+    assert answer.code == 0, answer.err
+    assert "2 planes, at most 19 runs" in answer.out and "run it: mutator run explored" in answer.out
+    facts = cli("plan", "explored", "--out", "run", "--json").json
+    assert [plane["cells"] for plane in facts["planes"]] == [16, 4]
+    assert cli("plan", "explored", "--out", "run", "--limit", "3").code == 2
+    assert not Path("run").exists()
