@@ -18,7 +18,7 @@ from mutator.api.exploration_planes import chosen_planes
 from mutator.api.runs import Run
 from mutator.api.scenario_choice import ScenarioLike
 from mutator.api.target_and_fault_selection import SelectedTarget
-from mutator.campaigns.campaign_files import Campaign
+from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.campaigns.campaign_scenarios import CampaignScenarios
 from mutator.campaigns.exploration_section import ExplorationSection
 from mutator.errors import MutatorError
@@ -150,6 +150,13 @@ def explore_campaign(
         insecure_network=insecure_network,
         progress=progress,
     )
+
+
+def planned_exploration(workspace: Workspace, campaign: str | Path, choices: Choices) -> ExploringCampaign:
+    """Return what a campaign explores; MutatorError for choices that do not apply."""
+    loaded = load_campaign(workspace.campaign(campaign))
+    refuse_choices(loaded, choices)
+    return ExploringCampaign.of_campaign(workspace, loaded, reading=choices.reading, seed=choices.seed)
 
 
 def refuse_choices(campaign: Campaign, choices: Choices, others: Sequence[str] = ()) -> None:

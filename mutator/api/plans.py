@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
-from mutator.campaigns.campaign_files import load_campaign_study
+from mutator.campaigns.campaign_files import load_campaign, load_campaign_study
 from mutator.campaigns.plan import Plan, SeedBySeedPlan, build_plan, load_plan
 from mutator.campaigns.plan_freezing import freeze_plan_with_tally
 from mutator.engines.forkable import reasons_by_unforkable_variant
@@ -32,6 +32,11 @@ def plan(
     planning = SeedBySeedPlan(opened_workspace, campaign, choices)
     folder, tally = freeze_plan_with_tally(planning, Path(out), opened_workspace)
     return load_plan(folder, tally)  # reading it back adds the cost measured in this folder, if any
+
+
+def explores(workspace: Workspace, campaign: str | Path) -> bool:
+    """Whether results of a campaign decide which experiments follow."""
+    return load_campaign(workspace.campaign(campaign)).exploration_request is not None
 
 
 def reasons_not_to_fork(plan: Plan, workspace: Workspace) -> dict[str, str]:

@@ -10,7 +10,8 @@ from mutator.api.stored_experiments import StoredRun
 from mutator.campaigns.plan import Plan, load_plan
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.run_traces import RunTraces
-from mutator.explore.exploration_replay import is_exploration, replay_exploration
+from mutator.explore.exploration_replay import ExplorationReplay, is_exploration, replay_exploration
+from mutator.explore.finding_search import Finding, FindingSearch
 from mutator.model import Status
 from mutator.results import outcome_counting
 from mutator.results.table_reader import Results
@@ -72,12 +73,25 @@ class RunContents(StoredRun):
         """What an exploration says of each fault, scenario and start that it has begun, from its plan and
         records; empty for other runs. CheckFailed if the plan does not follow from the records.
         """
+        return envelopes_of_replay(self._replay) if self._replay else ()
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """What a search has found: hazards, each with the smallest fault that reached it; empty for other
+        runs. CheckFailed as for `envelopes`.
+        """
+        search = self._replay.exploration if self._replay else None
+        return tuple(search.findings()) if isinstance(search, FindingSearch) else ()
+
+    @cached_property
+    def _replay(self) -> ExplorationReplay | None:
+        """The exploration, from its plan and records; None for other runs."""
         if not is_exploration(self.folder):
-            return ()
+            return None
         replay = replay_exploration(self.folder, self.manifest)
         for difference in replay.differences:
             raise CheckFailed(difference.got, where=difference.where, expected=difference.expected)
-        return envelopes_of_replay(replay)
+        return replay
 
     @cached_property
     def _results_frame(self) -> "pd.DataFrame":

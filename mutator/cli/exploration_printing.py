@@ -12,21 +12,11 @@ if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
 
-def planned_exploration(
-    workspace: "Workspace", campaign: str, choices: "Choices"
-) -> "ExploringCampaign | None":
-    """Return what a campaign explores; None for one that does not. MutatorError for choices that do not
-    apply.
-    """
-    from mutator.campaigns.campaign_files import load_campaign
+def plan_exploration(workspace: "Workspace", campaign: str, choices: "Choices") -> "ExploringCampaign":
+    """Return what a campaign explores; MutatorError for choices that do not apply."""
+    from mutator.api.exploring_campaigns import planned_exploration
 
-    loaded = load_campaign(workspace.campaign(campaign))
-    if loaded.exploration_request is None:
-        return None
-    from mutator.api.exploring_campaigns import ExploringCampaign, refuse_choices
-
-    refuse_choices(loaded, choices)
-    return ExploringCampaign.of_campaign(workspace, loaded, reading=choices.reading, seed=choices.seed)
+    return planned_exploration(workspace, campaign, choices)
 
 
 def print_exploration(terminal: Terminal, exploring: "ExploringCampaign", *, as_json: bool) -> None:

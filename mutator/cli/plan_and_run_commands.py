@@ -15,7 +15,7 @@ import mutator
 from mutator._common.cpu_cores import usable_cores
 from mutator.cli import shell_completion
 from mutator.cli.envelope_printing import print_envelopes
-from mutator.cli.exploration_printing import planned_exploration, print_exploration
+from mutator.cli.exploration_printing import plan_exploration, print_exploration
 from mutator.cli.github_step import GitHub, GitHubStep, showing_errors
 from mutator.cli.merge_report_clean_commands import print_outcome_counts
 from mutator.cli.plan_printing import print_plan, print_plan_as_json
@@ -98,7 +98,7 @@ def plan(
     Prints the expected time and disk space. `run` with the same folder then runs exactly these experiments.
     Of a campaign that explores, prints the planes and freezes nothing: results decide what is driven.
     """
-    from mutator.api.plans import reasons_not_to_fork
+    from mutator.api.plans import explores, reasons_not_to_fork
 
     terminal = Terminal(as_json, wide)
     workspace = workspace_options.workspace()
@@ -106,8 +106,8 @@ def plan(
         seed=seed, reading=reading, only=only, exclude=exclude, limit=limit, proportional=proportional
     )
     command = ["mutator", "run", campaign, "--out", str(out), *(["-n", str(workers)] if workers else [])]
-    if (exploring := planned_exploration(workspace, campaign, choices)) is not None:
-        print_exploration(terminal, exploring, as_json=as_json)
+    if explores(workspace, campaign):
+        print_exploration(terminal, plan_exploration(workspace, campaign, choices), as_json=as_json)
         terminal.print_command("run it:", shlex.join(command))
         return
     with terminal.show_spinner("planning"):

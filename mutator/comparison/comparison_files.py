@@ -13,7 +13,7 @@ from mutator._common.message_text import counted, with_unbreakable_numbers
 from mutator._common.table_rendering import TextTable, escaped_markdown_line
 from mutator.comparison.comparison_replays import ReportAddresses, addresses_from, replay_elements
 from mutator.comparison.envelope_changes import describe_envelope_changes
-from mutator.comparison.envelope_pictures import envelope_pictures
+from mutator.comparison.envelope_pictures import draw_envelope_changes
 from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeKind, time_to_hazard
 from mutator.comparison.input_differences_and_remarks import InputFact
 from mutator.comparison.run_comparison_and_gates import Comparison, Gate, describe_ending_change
@@ -207,7 +207,7 @@ def render_html_page(comparison: Comparison, addresses: ReportAddresses) -> str:
         counts=[(change.value, counts[change]) for change in ResultChangeKind if counts[change]],
         reasons=_unmatched_reasons_table(comparison),
         changed=_changed_table(comparison, addresses),
-        planes=list(envelope_pictures(comparison.envelope_changes)),
+        planes=list(draw_envelope_changes(comparison.envelope_changes)),
         report_b=addresses.b,
         limit=MOST_SHOWN_ROWS,
         styles=[Markup(text) for text in page_style_sheets()],

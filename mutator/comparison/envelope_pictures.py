@@ -24,7 +24,7 @@ class EnvelopePicture:
     evidence_id: str = ""
 
 
-def envelope_pictures(changes: Sequence[EnvelopeChange]) -> Iterator[EnvelopePicture]:
+def draw_envelope_changes(changes: Sequence[EnvelopeChange]) -> Iterator[EnvelopePicture]:
     """Yield a picture for each plane with the same lattice in both runs, those that got smaller first."""
     from markupsafe import Markup
 

@@ -63,6 +63,7 @@ def test_an_envelope_is_an_ordinary_finished_run(toycar: Workspace, tmp_path: Pa
     assert envelope.validation and envelope.exploration.failures(envelope.validation) == []
     run = mutator.load_run(tmp_path / "run", workspace=toycar)
     assert run.seal and run.verify().differences == ()
+    assert run.findings == () and run.envelopes[0].curve.equals(envelope.curve)
     [again] = explore(toycar, tmp_path / "run")
     assert again.as_json() == envelope.as_json()
     assert mutator.load_run(tmp_path / "run", workspace=toycar).seal == run.seal
@@ -216,6 +217,8 @@ def test_a_search_names_what_it_found(toycar: Workspace, tmp_path: Path) -> None
     assert {row["scenario"] for row in rows} == {"A", "B"}
     run = mutator.load_run(tmp_path / "run", workspace=toycar)
     assert len(run.records) == 14 and run.verify().differences == ()
+    assert {f.result.experiment_id for f in run.findings} == {row["experiment"] for row in rows}
+    assert run.envelopes == ()
 
 
 @pytest.mark.usefixtures("kept_checks")

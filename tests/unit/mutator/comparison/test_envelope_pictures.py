@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from mutator.comparison.envelope_changes import compare_envelopes
-from mutator.comparison.envelope_pictures import envelope_pictures
+from mutator.comparison.envelope_pictures import draw_envelope_changes
 from tests.unit.mutator.explore.made_envelopes import MADE_PLANE, envelope_of, line, never
 
 
@@ -14,7 +14,7 @@ def test_what_got_smaller_comes_first() -> None:
     before = [envelope_of(line), envelope_of(never, other), envelope_of(line, third)]
     after = [envelope_of(line), envelope_of(line, other), envelope_of(line, shorter)]
     changes = compare_envelopes((before, after))
-    smaller, same = envelope_pictures(changes)
+    smaller, same = draw_envelope_changes(changes)
     assert smaller.evidence_id and not same.evidence_id
     assert smaller.name.endswith("from 7 s") and " became hazardous" in smaller.text
     assert "<svg" in smaller.drawing and "from 7 s" in smaller.drawing
