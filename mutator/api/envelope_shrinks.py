@@ -44,6 +44,8 @@ class EnvelopeShrinker:
     ) -> "EnvelopeShrinker | None":
         """Return the shrinker for an experiment; None if its run folder has no envelope with it."""
         for number, envelope in enumerate(run.envelopes):
+            if envelope.plane.seeds > 1:  # each of its cells has several experiments
+                continue
             for cell, result in envelope.exploration.map.results.items():
                 if result.experiment_id == experiment.id:
                     simpler = (e for e in run.envelopes[:number] if _differs_in_scenario(e, envelope))

@@ -85,12 +85,15 @@ class ExploringCampaign:
 
     @property
     def most_runs(self) -> int:
-        """The most runs of the search and its validations; a repair of a plane can add a few."""
+        """The most runs of search and validations. Repairs and challengers come on top."""
         section = self.section
         if section.goal == "find":
             return section.budget
-        cells = (max(1, len(plane.magnitudes)) * len(plane.durations_s) for plane in section.planes)
-        return sum(min(count, section.search + section.validation) for count in cells)
+        most = section.search + section.validation
+        return sum(
+            min(max(1, len(plane.magnitudes)) * len(plane.durations_s), most) * plane.seeds
+            for plane in section.planes
+        )
 
     def run(
         self,

@@ -39,8 +39,9 @@ def print_exploration(terminal: Terminal, exploring: "ExploringCampaign", *, as_
     heads = ("fault", "scenario", "from", "magnitudes", "durations", "cells")
     terminal.print_table(heads, rows, right_aligned=(5,))
     planes, runs = counted(len(section.planes), "plane"), counted(exploring.most_runs, "run")
+    more = "" if section.goal == "find" else " of search and validation; repairs and challengers come on top"
     terminal.print_text(
-        f"{planes}, at most {runs} and the proof. Results decide what is driven, so nothing is frozen."
+        f"{planes}, at most {runs}{more}. Results decide what is driven, so nothing is frozen."
     )
 
 
