@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from mutator._common.message_text import counted
 from mutator.comparison.paired_rate_and_time_sheets import RunDisplayNames
 from mutator.explore.cell_results import CellResult, CellState
+from mutator.explore.challenges import ChallengedBound
 from mutator.explore.envelope import Envelope
 from mutator.explore.envelope_failures import nearest_hazardous_result, nearest_undecided_result
 from mutator.explore.envelope_texts import magnitude_text, name_of_plane
@@ -26,7 +27,9 @@ class EnvelopeChange:
     `became_undecided` counts cells that the first run calls without hazard, and of which the second says
     nothing, although their faults leave time to observe in the first. `evidence` is a run of the second: for
     the smallest, shortest fault that became hazardous the run that proves it, or the nearest hazardous one if
-    none does; otherwise the run without a result that is nearest to what became undecided; None without any.
+    none does; otherwise the run without a result that is nearest to what became undecided, or else that of
+    the challenger of the first of the `lowered_bounds`, which challengers left smaller than in the first
+    run; None without any.
     """
 
     a: Envelope
@@ -35,6 +38,7 @@ class EnvelopeChange:
     became_hazardous: int
     became_safe: int
     became_undecided: int
+    lowered_bounds: int
     evidence: CellResult | None
 
     @property
@@ -56,6 +60,7 @@ class EnvelopeChange:
         return (
             f"{name_of_plane(self.b)}: {counted(self.became_hazardous, 'cell')} of {self.decided} became "
             f"hazardous, {self.became_safe} no longer are, {self.became_undecided} no longer decided"
+            + (f"; challengers lower {counted(self.lowered_bounds, 'bound')}" if self.lowered_bounds else "")
         )
 
 
@@ -112,7 +117,8 @@ def envelopes_sheet(changes: Sequence[EnvelopeChange], names: RunDisplayNames) -
     note = (
         "Cells of which both runs say whether a hazard follows, with those between runs. An envelope is "
         f"smaller if a cell that {names.a} calls without hazard, driven or between runs, is hazardous in "
-        f"{names.b}, or not decided because runs there have no result or ended disengaged."
+        f"{names.b}, or not decided because runs there have no result or ended disengaged, or if challengers "
+        "leave less of what is survived."
     )
     return Sheet(name="envelopes", title="What is survived", note=note, heads=heads, lines=lines)
 
@@ -138,6 +144,8 @@ def _change(a: Envelope, b: Envelope) -> EnvelopeChange:
             became_safe += was.is_hazardous and now.is_without_hazard
             if was.is_without_hazard and now.is_hazardous:
                 became_hazardous.append((i, j))
+    lowered = list(_lowered_bounds(a, b))
+    evidence = _evidence(b, became_hazardous, became_undecided)
     return EnvelopeChange(
         a=a,
         b=b,
@@ -145,8 +153,27 @@ def _change(a: Envelope, b: Envelope) -> EnvelopeChange:
         became_hazardous=len(became_hazardous),
         became_safe=became_safe,
         became_undecided=len(became_undecided),
-        evidence=_evidence(b, became_hazardous, became_undecided),
+        lowered_bounds=len(lowered),
+        evidence=evidence or next((challenge.result for challenge in lowered), None),
     )
+
+
+def _lowered_bounds(a: Envelope, b: Envelope) -> Iterator[ChallengedBound]:
+    """Yield the bounds that challengers left smaller in the second run, if both have the same challengers."""
+    if a.plane.challengers != b.plane.challengers:
+        return
+    before = {(c.bound.is_duration, c.bound.duration_s): c for c in a.challenges if c.is_complete}
+    for challenge in b.challenges:
+        earlier = before.get((challenge.bound.is_duration, challenge.bound.duration_s))
+        if earlier and challenge.is_lowered and _size_left(b, challenge) < _size_left(a, earlier):
+            yield challenge
+
+
+def _size_left(envelope: Envelope, challenge: ChallengedBound) -> float:
+    if challenge.level is None:
+        return 0.0
+    values = envelope.durations_s if challenge.bound.is_duration else envelope.magnitudes
+    return abs(values[challenge.level] or 0.0)
 
 
 def _evidence(b: Envelope, hazardous: Sequence[Cell], undecided: Sequence[Cell]) -> CellResult | None:

@@ -35,7 +35,8 @@ def describe_plane(envelope: Envelope, hazards: Mapping[str, str]) -> str:
     """
     failure, undecided = first_failure(envelope), describe_undecided(envelope)
     if failure is not None:
-        fails = f"it first fails at {_failure_text(envelope, failure, hazards)}"
+        what = "a constant error" if envelope.is_challenged else "it"
+        fails = f"{what} first fails at {_failure_text(envelope, failure, hazards)}"
         text = f"{_without_hazard_text(envelope)}; {fails}."
     elif disengaged_cells(envelope):
         text = f"{_without_hazard_text(envelope)}."

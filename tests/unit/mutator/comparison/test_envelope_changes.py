@@ -95,3 +95,15 @@ def test_planes_of_one_run_are_named() -> None:
         "Only before has explored: sensor/bias/distance in A from 5 s.",
         "Only after has explored: sensor/bias/distance (negative) in A from 5 s.",
     ]
+
+
+def test_a_bound_that_challengers_lower_makes_an_envelope_smaller() -> None:
+    """Of constant errors, nothing changes; the run is that of the challenger. Not in the other direction."""
+    plane = replace(MADE_PLANE, challengers=("noise",))
+    before, after = envelope_of(line, plane), envelope_of(line, plane, challengers=lambda name, m, d: m < 2)
+    [change] = compare_envelopes(([before], [after]))
+    assert change.is_smaller and change.became_hazardous == 0 and change.lowered_bounds > 0
+    assert change.evidence and change.evidence.experiment_id.endswith("noise")
+    assert "challengers lower" in change.text
+    assert not compare_envelopes(([after], [before]))[0].is_smaller
+    assert not compare_envelopes(([after], [after]))[0].is_smaller
