@@ -65,6 +65,18 @@ def load_fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[F
     return tuple(runs)
 
 
+def latest_end_by_scenario(folder: RunFolder, manifest: TargetManifest) -> dict[str, float]:
+    """Return the latest end of each scenario's golden runs, in simulated seconds. MutatorError if one cannot
+    be read.
+    """
+    ends: dict[str, float] = {}
+    for golden_run in folder.goldens_with_files:
+        trace = load_trace(manifest, folder.golden_folder(*golden_run), [])
+        end = float(trace[manifest.time_channel][-1])
+        ends[golden_run.scenario] = max(end, ends.get(golden_run.scenario, end))
+    return ends
+
+
 def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> TextTable:
     """Return the table of fault-free runs: first times of hazards and alerts, and channel ranges. Of each
     family, it has the worst runs.

@@ -8,9 +8,8 @@ from mutator.campaigns.installed_studies import load_installed_study
 from mutator.errors import MutatorError
 from mutator.figures.drawings import Drawing
 from mutator.model import Experiment, Fault, Record, Status
-from mutator.outcomes.fault_free_runs import FaultFreeRun, load_fault_free_runs
+from mutator.outcomes.fault_free_runs import FaultFreeRun, latest_end_by_scenario, load_fault_free_runs
 from mutator.outcomes.fault_paths import fault_paths_of
-from mutator.outcomes.trace_and_record_loading import load_trace
 from mutator.report.change_since_run_before import ChangeSinceRunBefore
 from mutator.report.engine_summary import EngineSummary, summarize_engines
 from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN, ExperimentFacts
@@ -130,16 +129,10 @@ class ReportedRun:
         """
         if self.workspace is None:
             return None
-        ends: dict[str, float] = {}
         try:
-            manifest = self.workspace.manifest_of(self.folder.head)
-            for golden_run in self.folder.goldens_with_files:
-                trace = load_trace(manifest, self.folder.golden_folder(*golden_run), [])
-                end = float(trace[manifest.time_channel][-1])
-                ends[golden_run.scenario] = max(end, ends.get(golden_run.scenario, end))
+            return latest_end_by_scenario(self.folder, self.workspace.manifest_of(self.folder.head))
         except (MutatorError, KeyError):
             return None
-        return ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

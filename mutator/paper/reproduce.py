@@ -1,0 +1,113 @@
+"""Reproduces the published study: drives its campaigns, and writes the pages, tables and data set about them.
+
+    python -m mutator.paper.reproduce --out DIR            # drive what is missing, then write
+    python -m mutator.paper.reproduce --check [--out DIR]  # compare what is written, and say what has changed
+
+`--small` drives a few faults in each campaign, to try the whole way in minutes. It writes its pages into DIR
+instead of the clone.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from mutator._common.cpu_cores import usable_cores
+from mutator._common.files import make_folder, write_atomic
+from mutator.errors import MutatorError
+from mutator.paper.reproduction.campaign_tables import campaign_tables
+from mutator.paper.reproduction.data_set import write_data_set
+from mutator.paper.reproduction.study_campaigns import STUDY, StudyCampaign
+from mutator.paper.reproduction.study_check import (
+    DATA_SET_FOLDER,
+    StudyCheck,
+    changes_since_study,
+    other_figures,
+    pages_of,
+)
+from mutator.paper.reproduction.study_clone import (
+    DIFFERENCES_PAGE,
+    FIGURE,
+    RESULTS_PAGE,
+    TABLES_FOLDER,
+    StudyClone,
+)
+from mutator.paper.reproduction.study_driving import drive_study, finished_folders, open_study
+from mutator.paper.reproduction.study_figure import study_figure
+from mutator.paper.reproduction.study_tables import combined
+from mutator.store.plan_choices import Choices
+from mutator.workspace import Workspace
+
+_SMALL_CHOICES = Choices(
+    only='scenario == "S1" and fault_type in ("jamming", "speed")', limit=8, proportional=True
+)
+
+
+def write_study(
+    workspace: Workspace, campaigns: Sequence[StudyCampaign], out: Path, clone: StudyClone, docs_root: Path
+) -> None:
+    """Write tables, pages, figure and data set of a study whose campaigns are finished."""
+    folders = finished_folders(out, campaigns)
+    parts = [campaign_tables(each, folders[each.name], workspace, clone.commit) for each in campaigns]
+    rows = write_data_set(out / DATA_SET_FOLDER, clone.root, campaigns, folders, combined(parts))
+    tables = combined([*parts, {"data_set": rows}])
+    study = pages_of(workspace, campaigns, tables)
+    tables.write(docs_root / TABLES_FOLDER)
+    differences = (clone.root / DIFFERENCES_PAGE).read_text(encoding="utf-8")
+    files = {
+        RESULTS_PAGE: study.results_page().encode(),
+        DIFFERENCES_PAGE: study.with_blocks(differences).encode(),
+        FIGURE: study_figure(study),
+    }
+    for name, data in files.items():
+        make_folder((docs_root / name).parent)
+        write_atomic(docs_root / name, data)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit code: 1 if a check found a difference, 2 for wrong input."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--out", type=Path, metavar="DIR", help="the folder of the study")
+    parser.add_argument("-n", "--workers", type=int, default=usable_cores(), help="worker processes")
+    parser.add_argument("--check", action="store_true", help="drive and write nothing: compare")
+    parser.add_argument("--small", action="store_true", help="a few faults of each campaign, pages into DIR")
+    options = parser.parse_args(arguments)
+    if options.out is None and (options.small or not options.check):
+        parser.error("--out DIR is needed to drive")
+    try:
+        return _run(options)
+    except MutatorError as err:
+        print(f"error: {err}", file=sys.stderr)
+        return 2
+
+
+def _run(options: argparse.Namespace) -> int:
+    clone, workspace = StudyClone.of_this_package(), Workspace.find()
+    docs_root = options.out / "pages" if options.small else clone.root
+    campaigns = [each.small() for each in STUDY] if options.small else STUDY
+    if options.check:
+        check = StudyCheck(docs_root=docs_root, workspace=workspace, campaigns=campaigns)
+        return _check(check, options.out, clone)
+    open_study(options.out, clone)
+    choices = _SMALL_CHOICES if options.small else Choices()
+    drive_study(workspace, campaigns, options.out, workers=options.workers, choices=choices, tell=print)
+    write_study(workspace, campaigns, options.out, clone, docs_root)
+    print(f"written: {docs_root / RESULTS_PAGE}, tables, figure, and {options.out / DATA_SET_FOLDER}")
+    return 0
+
+
+def _check(check: StudyCheck, out: Path | None, clone: StudyClone) -> int:
+    sentence, deciding = changes_since_study(check.docs_root, clone)
+    problems = list(check.problems(out))
+    for problem in problems:
+        print(problem)
+    print(sentence)
+    for line in other_figures(clone.root, clone):
+        print(line)
+    if not problems:
+        print("pages, tables" + (", run folders and data set" if out else "") + " belong together")
+    return 1 if problems or deciding else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

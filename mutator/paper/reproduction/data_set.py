@@ -1,0 +1,131 @@
+"""The data set of the study: every experiment of every campaign, with what is needed to read and cite it."""
+
+import gzip
+import hashlib
+import io
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mutator._common.files import make_folder, remove_folder, write_atomic
+from mutator.errors import MutatorError
+from mutator.paper.reproduction.study_campaigns import StudyCampaign
+from mutator.paper.reproduction.study_tables import HEADS, Row, StudyTables
+from mutator.results.table_columns import result_columns_of
+from mutator.results.table_reader import Results
+from mutator.statistics.statistics_sheet import Sheet
+from mutator.store.run_folder import RunFolder
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MOST_BYTES = 30_000_000
+_CAMPAIGN_COLUMN = "campaign"
+_LEFT_OUT_COLUMNS = ("sentence",)  # words that follow from the other columns
+_SUMS_FILE = "SHA256SUMS"
+_README = """\
+# Data of the reproduction
+
+Every experiment of the campaigns in `runs.csv`, made at one commit of mutator.
+
+* `experiments.parquet` and `experiments.csv.gz` have the same rows: the results of each experiment.
+* `dictionary.csv` says what each column means, with its type and unit.
+* `runs.csv` has plan digest, seal and results digest of each campaign, and what computed it.
+* The other CSV files are the summary tables of the pages; each is also a Parquet file.
+* `LICENSE` and `CITATION.cff` say how to use and cite the data.
+
+Check the files with `sha256sum -c SHA256SUMS`. The page of the results names the digests of all files.
+"""
+
+
+def write_data_set(
+    folder: Path,
+    clone_root: Path,
+    campaigns: Sequence[StudyCampaign],
+    run_folders: Mapping[str, RunFolder],
+    tables: StudyTables,
+) -> list[Row]:
+    """Write the data set into a new folder; return its files with sizes and digests. MutatorError if it is
+    larger than `MOST_BYTES`.
+    """
+    remove_folder(folder)
+    make_folder(folder)
+    frame = _experiments(campaigns, run_folders)
+    frame.to_parquet(folder / "experiments.parquet", compression="zstd", index=False)
+    write_atomic(folder / "experiments.csv.gz", _gzipped_csv(frame))
+    write_atomic(folder / "dictionary.csv", _dictionary(run_folders).as_csv().encode())
+    for name, data in tables.file_bytes().items():
+        if name != "data_set.csv":
+            write_atomic(folder / name, data)
+            _write_parquet(folder / name.replace(".csv", ".parquet"), name, tables)
+    for name in ("LICENSE", "CITATION.cff"):
+        shutil.copyfile(clone_root / name, folder / name)
+    write_atomic(folder / "README.md", _README.encode())
+    files = sorted(path.name for path in folder.iterdir())
+    sums = {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in files}
+    text = "".join(f"{digest}  {name}\n" for name, digest in sums.items())
+    write_atomic(folder / _SUMS_FILE, text.encode())
+    rows: list[Row] = [
+        {"file": name, "bytes": str((folder / name).stat().st_size), "sha256": digest}
+        for name, digest in sums.items()
+    ]
+    if (size := sum(int(row["bytes"]) for row in rows)) > MOST_BYTES:
+        raise MutatorError(f"a data set of {size:,} bytes", where=folder, expected=f"at most {MOST_BYTES:,}")
+    return rows
+
+
+def changed_files(folder: Path, rows: Sequence[Row]) -> list[str]:
+    """Return the files of a data set that are missing or differ from their digests."""
+    return [
+        row["file"]
+        for row in rows
+        if not (path := folder / Path(row["file"]).name).is_file()
+        or hashlib.sha256(path.read_bytes()).hexdigest() != row["sha256"]
+    ]
+
+
+def _experiments(campaigns: Sequence[StudyCampaign], run_folders: Mapping[str, RunFolder]) -> "pd.DataFrame":
+    import pandas as pd
+
+    parts = []
+    for campaign in campaigns:
+        results = Results.up_to_date(run_folders[campaign.name].path).frame()
+        rest = [name for name in results.columns if name not in _LEFT_OUT_COLUMNS]
+        results = results[rest]
+        results.insert(0, _CAMPAIGN_COLUMN, campaign.name)
+        parts.append(results)
+    return pd.concat(parts, ignore_index=True)
+
+
+def _gzipped_csv(frame: "pd.DataFrame") -> bytes:
+    """Return the frame as CSV, compressed to the same bytes every time."""
+    out = io.BytesIO()
+    with gzip.GzipFile(filename="", fileobj=out, mode="wb", mtime=0) as file:
+        file.write(frame.to_csv(index=False, lineterminator="\n").encode())
+    return out.getvalue()
+
+
+def _dictionary(run_folders: Mapping[str, RunFolder]) -> Sheet:
+    columns = {
+        column.name: (column.name, column.type, column.unit, column.about)
+        for folder in run_folders.values()
+        for column in result_columns_of(folder)
+        if column.name not in _LEFT_OUT_COLUMNS
+    }
+    first = (_CAMPAIGN_COLUMN, "text", "", "the campaign of `runs.csv`")
+    return Sheet(
+        name="dictionary",
+        title="",
+        note="",
+        heads=("column", "type", "unit", "meaning"),
+        lines=(first, *columns.values()),
+    )
+
+
+def _write_parquet(path: Path, name: str, tables: StudyTables) -> None:
+    import pandas as pd
+
+    table = name.removesuffix(".csv")
+    frame = pd.DataFrame(tables.rows(table), columns=list(HEADS[table]), dtype=str)
+    frame.to_parquet(path, compression="zstd", index=False)

@@ -1,0 +1,307 @@
+"""Renders the pages of the study from its tables, the paper's numbers, and templates.
+
+Templates have no number of a campaign: every table and every sentence that judges comes from here.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from mutator._common.table_rendering import TextTable
+from mutator.errors import MutatorError
+from mutator.paper.fault_type_rank_agreement import GUIDED
+from mutator.paper.observation_judging import ClaimVerdict
+from mutator.paper.published_numbers import PublishedNumbers
+from mutator.paper.reproduction.campaign_tables import ALL_TYPES, WITHOUT_FRAMES
+from mutator.paper.reproduction.study_campaigns import StudyCampaign
+from mutator.paper.reproduction.study_tables import Row, StudyTables, tally_of_row
+from mutator.statistics.guided_against_random import RANDOM
+from mutator.statistics.shares_with_intervals import Share, share_with_interval
+from mutator.statistics.tallies import Tally, sum_tallies
+
+PAPER = "paper"
+NEAR_POINTS = 10.0  # a rate within so many points of the paper's is called near
+_MEASURES = (
+    ("manifested", "manifested"),
+    ("hazards", "hazards"),
+    ("alerts", "alerts"),
+    ("hazards without alert", "hazards_no_alerts"),
+    ("alerts without hazard", "alerts_no_hazards"),
+)
+_BLOCK = re.compile(r"<!-- study: (\w+) -->\n.*?<!-- end of study -->", re.DOTALL)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyPages:
+    """What templates can name."""
+
+    tables: StudyTables
+    campaigns: Sequence[StudyCampaign]
+    published: PublishedNumbers
+
+    @property
+    def whole(self) -> list[StudyCampaign]:
+        """The campaigns that are no samples."""
+        return [campaign for campaign in self.campaigns if not campaign.is_sample]
+
+    @cached_property
+    def commit(self) -> str:
+        commits = {row["commit"] for row in self.tables.rows("runs")}
+        return commits.pop() if len(commits) == 1 else "different commits"
+
+    def results_page(self) -> str:
+        """Return the whole page with the results."""
+        from jinja2 import Environment, PackageLoader, StrictUndefined
+
+        environment = Environment(
+            loader=PackageLoader("mutator.paper.reproduction", "pages"),
+            undefined=StrictUndefined,
+            keep_trailing_newline=True,
+            trim_blocks=True,
+            lstrip_blocks=True,
+            autoescape=False,
+        )
+        return environment.get_template("paper-results.md.j2").render(study=self)
+
+    def with_blocks(self, page: str) -> str:
+        """Return a page with its marked blocks rendered again. MutatorError for a block without renderer."""
+        return _BLOCK.sub(self._rendered_block, page)
+
+    def _rendered_block(self, match: re.Match[str]) -> str:
+        renderer: Any = getattr(self, f"{match[1]}_table", None)
+        if renderer is None:
+            raise MutatorError(f"a block '{match[1]}' that no table of the study fills")
+        return f"<!-- study: {match[1]} -->\n{renderer()}\n<!-- end of study -->"
+
+    def runs_table(self) -> str:
+        heads = ("campaign", "experiments", "seal", "results digest")
+        rows = [
+            (row["title"], f"{int(row['experiments']):,}", f"`{row['seal']}`", f"`{row['results_digest']}`")
+            for row in self.tables.rows("runs")
+        ]
+        return _markdown(heads, rows)
+
+    def versions(self) -> str:
+        """Return the versions that computed the results."""
+        rows = self.tables.rows("runs")
+        names = [("Python", "python"), ("mutator", "mutator")]
+        texts = [f"{label} {', '.join(sorted({row[key] for row in rows}))}" for label, key in names]
+        return "; ".join(texts)
+
+    def data_set_table(self) -> str:
+        rows = [
+            (f"`{row['file']}`", f"{int(row['bytes']):,}", f"`{row['sha256']}`")
+            for row in self.tables.rows("data_set")
+        ]
+        return _markdown(("file", "bytes", "SHA-256"), rows)
+
+    def fault_types_table(self, method: str, part: str, whole: str) -> str:
+        """Tabulate a share by fault type, with the paper's."""
+        kinds = [kind for how, kind in self.published.tally_by_fault_type if how == method]
+        rows = []
+        for kind in (*kinds, "total"):
+            names = kinds if kind == "total" else [kind]
+            published = sum_tallies(self.published.tally_by_fault_type[method, name] for name in names)
+            cells = [str(_share(published, part, whole))]
+            cells += [str(_share(self._tally(c.name, method, names), part, whole)) for c in self.whole]
+            rows.append((kind, *cells))
+        return _markdown(("fault type", PAPER, *(c.title for c in self.whole)), rows)
+
+    def scenarios_table(self, method: str) -> str:
+        """Tabulate table II: shares of activated faults by scenario."""
+        scenarios = self._scenarios(method)
+        rows = []
+        for label, part in _MEASURES:
+            for source, tallies in self._tallies_by_source(method, scenarios):
+                cells = [_count_text(tally, part) for tally in (*tallies, sum_tallies(tallies))]
+                rows.append((label, source, *cells))
+        return _markdown(("measure", "source", *scenarios, "all"), rows)
+
+    def alerts_table(self, method: str = GUIDED) -> str:
+        """Tabulate the share of activated faults with an alert, and its difference from the paper's in
+        points: bold if it is more than `NEAR_POINTS`.
+        """
+        scenarios = self._scenarios(method)
+        (_, published), *others = self._tallies_by_source(method, scenarios)
+        rows = [(PAPER, *(_percent(tally, "alerts") for tally in (*published, sum_tallies(published))))]
+        for source, tallies in others:
+            pairs = zip((*tallies, sum_tallies(tallies)), (*published, sum_tallies(published)), strict=True)
+            rows.append((source, *(_with_difference(ours, theirs, "alerts") for ours, theirs in pairs)))
+        return _markdown(("alerts of activated", *scenarios, "all"), rows)
+
+    def kinds_of_alerts_table(self, method: str = GUIDED) -> str:
+        """Tabulate in how many runs of each scenario each alert was raised."""
+        scenarios = self._scenarios(method)
+        rows = []
+        for campaign in self.whole:
+            of_campaign = self.tables.rows("alerts", campaign=campaign.name, method=method)
+            for alert in sorted({row["alert"] for row in of_campaign}):
+                runs = {row["scenario"]: row["runs"] for row in of_campaign if row["alert"] == alert}
+                rows.append((campaign.title, alert, *(runs.get(name, "0") for name in scenarios)))
+        return _markdown(("campaign", "alert", *scenarios), rows)
+
+    def alerts_by_fault_type_table(self, campaign: str) -> str:
+        """Tabulate, for one campaign, how many activated guided faults raised an alert, by scenario."""
+        rows_of_campaign = self.tables.rows("alerts_by_fault_type", campaign=campaign)
+        scenarios = sorted({row["scenario"] for row in rows_of_campaign})
+        rows = []
+        for kind in dict.fromkeys(row["fault_type"] for row in rows_of_campaign):
+            cells = {row["scenario"]: row for row in rows_of_campaign if row["fault_type"] == kind}
+            texts = [
+                f"{cells[s]['alerts']} of {cells[s]['activated']}" if s in cells else "-" for s in scenarios
+            ]
+            rows.append((kind, *texts))
+        return _markdown(("fault type", *scenarios), rows)
+
+    def fault_free_alerts(self) -> str:
+        """Say which fault-free runs raise an alert or have a hazard."""
+        titles = {campaign.name: campaign.title for campaign in self.campaigns}
+        texts = []
+        for row in self.tables.rows("fault_free"):
+            if events := " and ".join(filter(None, (row["alerts"], row["hazards"]))):
+                texts.append(f"{row['scenario']} ({titles[row['campaign']]}): {events}")
+        if not texts:
+            return "No fault-free run of these campaigns raises an alert or has a hazard."
+        return f"Alerts and hazards of fault-free runs: {'; '.join(texts)}."
+
+    def summary_table(self) -> str:
+        measures = (
+            ("hazards", "hazards"),
+            ("hazards without an alert", "hazards_no_alerts"),
+            ("alerts", "alerts"),
+        )
+        rows = [self._total_row(label, GUIDED, part) for label, part in measures]
+        for label, types in (
+            ("hazards by fault type: rank correlation with the paper", ALL_TYPES),
+            ("the same, types without camera frames", WITHOUT_FRAMES),
+        ):
+            cells = [self.tables.rows("agreement", campaign=c.name, fault_types=types) for c in self.whole]
+            rows.append((label, "", *(_interval_text(found[0]) if found else "-" for found in cells)))
+        rows.append(self._total_row("hazards, random", RANDOM, "hazards"))
+        heads = ("of activated faults, guided except in the last line", PAPER, *(c.title for c in self.whole))
+        return _markdown(heads, rows)
+
+    def agreement_table(self) -> str:
+        """Say of each campaign which fault types are within `NEAR_POINTS` of the paper's hazards."""
+        kinds = [kind for how, kind in self.published.tally_by_fault_type if how == GUIDED]
+        rows = []
+        for campaign in self.whole:
+            near: list[str] = []
+            far: list[str] = []
+            for kind in kinds:
+                ours = _share(self._tally(campaign.name, GUIDED, [kind]), "hazards", "activated").rate
+                theirs = _share(self.published.tally_by_fault_type[GUIDED, kind], "hazards", "activated").rate
+                if ours == ours:  # NaN: not driven
+                    points = 100 * (ours - theirs)
+                    (near if abs(points) <= NEAR_POINTS else far).append(f"{kind} ({points:+.0f})")
+            rows.append((campaign.title, f"{len(near)} of {len(near) + len(far)}", ", ".join(far) or "-"))
+        heads = ("campaign", "types within ten points of the paper", "others, with the difference in points")
+        return _markdown(heads, rows)
+
+    def observations_table(self) -> str:
+        """Tabulate each observation's verdict in each campaign, with what would change it."""
+        rows = []
+        for number, title in dict.fromkeys(
+            (row["observation"], row["title"]) for row in self.tables.rows("observations")
+        ):
+            cells = []
+            for campaign in self.campaigns:
+                [row] = self.tables.rows("observations", campaign=campaign.name, observation=number)
+                cells.append(f"**{row['verdict']}** ({row['change']})")
+            rows.append((f"{number}: {title}", *cells))
+        return _markdown(("observation", *(c.title for c in self.campaigns)), rows)
+
+    def claims_table(self, campaign: str) -> str:
+        """Tabulate the claims of one campaign: estimate, rule, verdict, and what would change it."""
+        rows = [
+            (
+                row["claim"] + ("*" if row["needed"] else ""),
+                row["group"],
+                row["estimate"],
+                row["rule"],
+                row["verdict"],
+                row["change"] or "-",
+            )
+            for row in self.tables.rows("claims", campaign=campaign)
+        ]
+        return _markdown(("claim", "", "here", "rule", "verdict", "would change with"), rows)
+
+    def seeds_table(self) -> str:
+        heads = ("share", "all seeds, 95 % of runs", "95 % between seeds", "least", "largest")
+        rows = [
+            tuple(row[key] for key in ("share", "all_seeds", "between_seeds", "least", "largest"))
+            for row in self.tables.rows("seeds")
+        ]
+        return _markdown(heads, rows)
+
+    def seed_verdicts_table(self) -> str:
+        """Count the seeds in which each observation holds, and name what would change each verdict."""
+        rows = []
+        for number, title in dict.fromkeys(
+            (row["observation"], row["title"]) for row in self.tables.rows("observations")
+        ):
+            of_seeds = self.tables.rows("observations_by_seed", observation=number)
+            seeds = {
+                verdict: [row["seed"] for row in of_seeds if row["verdict"] == verdict.value]
+                for verdict in ClaimVerdict
+            }
+            cells = [f"{len(names)} ({', '.join(names)})" if names else "0" for names in seeds.values()]
+            rows.append((f"{number}: {title}", *cells))
+        return _markdown(("observation", *(f"{verdict.value} (seeds)" for verdict in ClaimVerdict)), rows)
+
+    def _total_row(self, label: str, method: str, part: str) -> tuple[str, ...]:
+        sources = self._tallies_by_source(method, self._scenarios(method))
+        return (label, *(_percent(sum_tallies(tallies), part) for _, tallies in sources))
+
+    def _scenarios(self, method: str) -> list[str]:
+        return sorted(name for how, name in self.published.tally_by_scenario if how == method)
+
+    def _tallies_by_source(self, method: str, scenarios: Sequence[str]) -> list[tuple[str, list[Tally]]]:
+        sources = [(PAPER, [self.published.tally_by_scenario[method, name] for name in scenarios])]
+        for campaign in self.whole:
+            rows = self.tables.rows("scenarios", campaign=campaign.name, method=method)
+            by_name = {row["scenario"]: tally_of_row(row) for row in rows}
+            sources.append((campaign.title, [by_name.get(name, _NOTHING) for name in scenarios]))
+        return sources
+
+    def _tally(self, campaign: str, method: str, kinds: Iterable[str]) -> Tally:
+        rows: list[Row] = self.tables.rows("fault_types", campaign=campaign, method=method)
+        by_name = {row["fault_type"]: tally_of_row(row) for row in rows}
+        return sum_tallies(by_name.get(kind, _NOTHING) for kind in kinds)
+
+
+_NOTHING = Tally(
+    injected=0, activated=0, hazards=0, manifested=0, alerts=0, hazards_no_alerts=0, alerts_no_hazards=0
+)
+
+
+def _share(tally: Tally, part: str, whole: str) -> Share:
+    return share_with_interval(getattr(tally, part), getattr(tally, whole))
+
+
+def _count_text(tally: Tally, part: str) -> str:
+    """Return `35.8 % (1316/3678)`, of the activated faults."""
+    count, of = getattr(tally, part), tally.activated
+    return f"{100 * count / of:.1f} % ({count}/{of})" if of else "-"
+
+
+def _percent(tally: Tally, part: str) -> str:
+    return f"{100 * getattr(tally, part) / tally.activated:.1f} %" if tally.activated else "-"
+
+
+def _with_difference(ours: Tally, theirs: Tally, part: str) -> str:
+    if not ours.activated or not theirs.activated:
+        return "-"
+    points = 100 * (getattr(ours, part) / ours.activated - getattr(theirs, part) / theirs.activated)
+    text = f"{points:+.0f}"
+    return f"{_percent(ours, part)} ({f'**{text}**' if abs(points) > NEAR_POINTS else text})"
+
+
+def _interval_text(row: Row) -> str:
+    return f"{row['correlation']} ({row['low']} to {row['high']})"
+
+
+def _markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    return TextTable(heads=heads, rows=rows).as_markdown()

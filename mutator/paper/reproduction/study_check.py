@@ -1,0 +1,126 @@
+"""Checks that pages, tables, runs and data set of the study belong together, and what has changed since."""
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mutator._common.message_text import counted
+from mutator.audit.run_digests_and_seal import seals_of
+from mutator.errors import MutatorError
+from mutator.paper.published_numbers import load_published_numbers
+from mutator.paper.reproduction.campaign_tables import campaign_tables
+from mutator.paper.reproduction.data_set import changed_files
+from mutator.paper.reproduction.page_rendering import StudyPages
+from mutator.paper.reproduction.study_campaigns import StudyCampaign
+from mutator.paper.reproduction.study_clone import (
+    DIFFERENCES_PAGE,
+    FIGURE,
+    RESULTS_PAGE,
+    TABLES_FOLDER,
+    StudyClone,
+    deciding_files,
+)
+from mutator.paper.reproduction.study_driving import finished_folders
+from mutator.paper.reproduction.study_figure import study_figure
+from mutator.paper.reproduction.study_tables import StudyTables, combined, load_tables
+from mutator.workspace import Workspace
+
+OTHER_FIGURES_FILE = "docs/explanation/figures.csv"
+DATA_SET_FOLDER = "data_set"
+_MOST_NAMED = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyCheck:
+    """What a check of the pages in `docs_root` compares: the folder that has `docs/`."""
+
+    docs_root: Path
+    workspace: Workspace
+    campaigns: Sequence[StudyCampaign]
+
+    def problems(self, out: Path | None) -> Iterator[str]:
+        """Yield each difference between tables, pages and, with a study folder, its runs and data set."""
+        tables = load_tables(self.docs_root / TABLES_FOLDER)
+        yield from self._page_problems(tables)
+        if out is not None:
+            yield from self._run_problems(tables, out)
+            for name in changed_files(out / DATA_SET_FOLDER, tables.rows("data_set")):
+                yield f"{out / DATA_SET_FOLDER / name}: missing, or not the file whose digest the page names"
+
+    def _page_problems(self, tables: StudyTables) -> Iterator[str]:
+        study = pages_of(self.workspace, self.campaigns, tables)
+        page = (self.docs_root / RESULTS_PAGE).read_text(encoding="utf-8")
+        yield from _differences(RESULTS_PAGE, page, study.results_page())
+        page = (self.docs_root / DIFFERENCES_PAGE).read_text(encoding="utf-8")
+        yield from _differences(DIFFERENCES_PAGE, page, study.with_blocks(page))
+        if (self.docs_root / FIGURE).read_bytes() != study_figure(study):
+            yield f"{FIGURE}: not the figure of the tables"
+
+    def _run_problems(self, tables: StudyTables, out: Path) -> Iterator[str]:
+        folders = finished_folders(out, self.campaigns)
+        for row in tables.rows("runs"):
+            seal = seals_of(folders[row["campaign"]]).seal
+            if seal != row["seal"]:
+                yield f"{row['campaign']}: the run folder has the seal {seal}, not {row['seal']}"
+        [commit] = {row["commit"] for row in tables.rows("runs")} or {""}
+        again = combined(
+            [
+                *(campaign_tables(c, folders[c.name], self.workspace, commit) for c in self.campaigns),
+                {"data_set": tables.rows("data_set")},
+            ]
+        )
+        for name in tables.different_tables(again):
+            yield f"{TABLES_FOLDER}/{name}: not what the run folders give"
+
+
+def pages_of(workspace: Workspace, campaigns: Sequence[StudyCampaign], tables: StudyTables) -> StudyPages:
+    published = load_published_numbers(workspace.references)
+    return StudyPages(tables=tables, campaigns=campaigns, published=published)
+
+
+def _differences(name: str, page: str, rendered: str) -> Iterator[str]:
+    """Yield the first line in which a page differs from what the tables give."""
+    if page == rendered:
+        return
+    got, expected = page.splitlines(), rendered.splitlines()
+    for number, (mine, theirs) in enumerate(zip(got, expected, strict=False), start=1):
+        if mine != theirs:
+            yield f"{name}:{number}: not what the tables give\n  is:     {mine}\n  should: {theirs}"
+            return
+    yield f"{name}: {len(got)} lines, and the tables give {len(expected)}"
+
+
+def changes_since_study(docs_root: Path, clone: StudyClone) -> tuple[str, tuple[str, ...]]:
+    """Return a sentence on what changed since the study's commit, and the files that decide its figures."""
+    tables = load_tables(docs_root / TABLES_FOLDER)
+    commits = {row["commit"] for row in tables.rows("runs")}
+    if len(commits) != 1:
+        raise MutatorError("runs of different commits", where=docs_root / TABLES_FOLDER / "runs.csv")
+    [commit] = commits
+    changed = clone.files_changed_since(commit)
+    deciding = deciding_files(changed)
+    sentence = f"since {commit[:12]}: {counted(len(changed), 'file')} changed besides the study's own pages, "
+    return sentence + f"{len(deciding)} of them can decide a figure{_named(deciding)}", deciding
+
+
+def other_figures(docs_root: Path, clone: StudyClone) -> Iterator[str]:
+    """Yield a sentence for each other figure of the docs with a commit: how much has changed since."""
+    with (docs_root / OTHER_FIGURES_FILE).open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        if row["commit"]:
+            changed = deciding_files(clone.files_changed_since(row["commit"]))
+            files = (
+                f"{counted(len(changed), 'deciding file')} changed since {row['commit']}"
+                if changed
+                else "current"
+            )
+            yield f"{row['page']}, {row['figure']}: {files}"
+
+
+def _named(files: Sequence[str]) -> str:
+    if not files:
+        return ""
+    more = f" and {len(files) - _MOST_NAMED} more" if len(files) > _MOST_NAMED else ""
+    return f": {', '.join(files[:_MOST_NAMED])}{more}"
