@@ -97,12 +97,15 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _check(check: StudyCheck, out: Path | None, clone: StudyClone) -> int:
-    sentence, deciding = changes_since_study(check.docs_root, clone)
-    problems = list(check.problems(out))
-    for problem in problems:
-        print(problem)
-    print(sentence)
-    for line in other_figures(clone.root, clone):
+    problems: list[str] = []
+    deciding: tuple[str, ...] = ()
+    if (check.docs_root / TABLES_FOLDER).is_dir():
+        problems = list(check.problems(out))
+        sentence, deciding = changes_since_study(check.docs_root, clone)
+    else:
+        problems.append(f"{TABLES_FOLDER}: missing; the pages show older runs, until the study is driven")
+        sentence = "figures that have other commands:"
+    for line in (*problems, sentence, *other_figures(clone.root, clone)):
         print(line)
     if not problems:
         print("pages, tables" + (", run folders and data set" if out else "") + " belong together")

@@ -37,6 +37,8 @@ def test_a_plan_is_the_same_each_time(cli: Cli, root: Path) -> None:
         (["toy", "--out", "p", "--exclude", "value >= 0 or trigger != ''"], "no experiment is left"),
         (["toy", "--out", "p", "--reading", "as_read"], "as_described"),
         (["toy", "--out", "full"], "not empty"),
+        (["toy", "--out", "p", "--limit", "10", "--proportional"], "a multiple of 2, 12 or more"),
+        (["toy", "--out", "p", "--proportional"], "the number of experiments to keep"),
     ],
 )
 def test_an_invalid_plan_is_refused(cli: Cli, root: Path, words: list[str], said: str) -> None:

@@ -16,7 +16,7 @@ from mutator.paper.observation_judging import ClaimVerdict
 from mutator.paper.published_numbers import PublishedNumbers
 from mutator.paper.reproduction.campaign_tables import ALL_TYPES, WITHOUT_FRAMES
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
-from mutator.paper.reproduction.study_tables import Row, StudyTables, tally_of_row
+from mutator.paper.reproduction.study_tables import HEADS, Row, StudyTables, tally_of_row
 from mutator.statistics.guided_against_random import RANDOM
 from mutator.statistics.shares_with_intervals import Share, share_with_interval
 from mutator.statistics.tallies import Tally, sum_tallies
@@ -82,6 +82,10 @@ class StudyPages:
             for row in self.tables.rows("runs")
         ]
         return _markdown(heads, rows)
+
+    def table_links(self) -> str:
+        """Return links to all tables, which lie in a folder beside the page."""
+        return ", ".join(f"[{name}](tables/{name}.csv)" for name in HEADS)
 
     def versions(self) -> str:
         """Return the versions that computed the results."""
@@ -304,4 +308,4 @@ def _interval_text(row: Row) -> str:
 
 
 def _markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    return TextTable(heads=heads, rows=rows).as_markdown()
+    return TextTable(heads=heads, rows=rows).as_markdown(escape=False)

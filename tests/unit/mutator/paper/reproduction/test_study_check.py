@@ -1,0 +1,151 @@
+"""An edited number, in a page or in a table, is found, and so are files that changed since the study."""
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.paper.reproduction import study_clone
+from mutator.paper.reproduction.study_campaigns import STUDY
+from mutator.paper.reproduction.study_check import StudyCheck, changes_since_study
+from mutator.paper.reproduction.study_clone import (
+    DIFFERENCES_PAGE,
+    FIGURE,
+    RESULTS_PAGE,
+    TABLES_FOLDER,
+    StudyClone,
+    deciding_files,
+)
+from mutator.paper.reproduction.study_driving import open_study
+from mutator.paper.reproduction.study_figure import study_figure
+from mutator.workspace import Workspace
+
+from .made_up_study import CLONE, made_up_pages, made_up_tables
+
+BLOCKS = "Text.\n\n<!-- study: summary -->\nobsolete\n<!-- end of study -->\n\nMore.\n"
+
+
+def git(root: Path, *arguments: str) -> str:
+    identity = ("-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "commit.gpgsign=false")
+    command = ["git", "-C", str(root), *identity, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+@pytest.fixture
+def clone(tmp_path: Path) -> StudyClone:
+    """A clone at the commit of a study, whose pages and tables are those of made-up runs."""
+    root = tmp_path / "clone"
+    (root / "target").mkdir(parents=True)
+    (root / "target" / "car.py").write_text("GAIN = 1\n")
+    (root / "README.md").write_text("Read me.\n")
+    git(root.parent, "init", "-q", str(root))
+    git(root, "add", "-A")
+    git(root, "commit", "-q", "-m", "first")
+    commit = git(root, "rev-parse", "HEAD")
+    study = made_up_pages(commit)
+    made_up_tables(commit).write(root / TABLES_FOLDER)
+    (root / RESULTS_PAGE).write_text(study.results_page())
+    (root / DIFFERENCES_PAGE).write_text(study.with_blocks(BLOCKS))
+    (root / FIGURE).write_bytes(study_figure(study))
+    return StudyClone(root=root, commit=commit)
+
+
+def problems(clone: StudyClone) -> list[str]:
+    workspace = Workspace.find(root=CLONE)
+    check = StudyCheck(docs_root=clone.root, workspace=workspace, campaigns=STUDY)
+    return list(check.problems(None))
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def test_pages_as_they_were_written_have_no_problem(clone: StudyClone) -> None:
+    assert problems(clone) == []
+    page = (clone.root / DIFFERENCES_PAGE).read_text()
+    assert (
+        "obsolete" not in page and page.startswith("Text.") and page.endswith("More.\n") and "35.8 %" in page
+    )
+
+
+@pytest.mark.parametrize("name", [RESULTS_PAGE, DIFFERENCES_PAGE])
+def test_a_number_of_a_page_edited_by_hand_is_found(clone: StudyClone, name: str) -> None:
+    edit(clone.root / name, "35.8 %", "36.8 %")
+    [problem] = problems(clone)
+    assert problem.startswith(f"{name}:") and "36.8 %" in problem
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [("fault_types.csv", "radar/chaff,480,432", "radar/chaff,480,431"), ("runs.csv", "numpy==2", "numpy==3")],
+)
+def test_an_edited_table_is_found(clone: StudyClone, name: str, old: str, new: str) -> None:
+    """Also where the page does not show the cell: it names the digest of all tables."""
+    edit(clone.root / TABLES_FOLDER / name, old, new)
+    assert any(RESULTS_PAGE in problem for problem in problems(clone))
+
+
+def test_another_figure_is_found(clone: StudyClone) -> None:
+    edit(clone.root / FIGURE, "#0072b2", "#0072b3")
+    assert problems(clone) == [f"{FIGURE}: not the figure of the tables"]
+
+
+@pytest.mark.parametrize("content", [b"", b"campaign\n", b"campaign,title\r\na,b\r\n", b"\xff"])
+def test_a_broken_table_is_refused(clone: StudyClone, content: bytes) -> None:
+    (clone.root / TABLES_FOLDER / "runs.csv").write_bytes(content)
+    with pytest.raises(MutatorError, match=r"table of the study|not as the study writes it"):
+        problems(clone)
+
+
+def test_changed_files_that_decide_figures_are_named(clone: StudyClone) -> None:
+    assert changes_since_study(clone.root, clone)[1] == ()
+    (clone.root / "README.md").write_text("Read me again.\n")
+    (clone.root / "target" / "car.py").write_text("GAIN = 2\n")
+    sentence, deciding = changes_since_study(clone.root, clone)
+    assert deciding == ("target/car.py",) and "2 files changed" in sentence and "target/car.py" in sentence
+
+
+def test_doors_decide_no_figure() -> None:
+    files = (
+        "mutator/cli/app.py",
+        "mutator/model.py",
+        "docs/README.md",
+        "mutator/report/panel.py",
+        "setup.py",
+    )
+    assert deciding_files(files) == ("mutator/model.py", "setup.py")
+
+
+def test_a_study_goes_on_only_at_its_commit_and_without_changes(clone: StudyClone, tmp_path: Path) -> None:
+    """Its own pages and tables may differ."""
+    out = tmp_path / "study"
+    open_study(out, clone)
+    open_study(out, clone)
+    with pytest.raises(MutatorError, match="a study of commit"):
+        open_study(out, StudyClone(root=clone.root, commit="cd" * 20))
+    (clone.root / "target" / "new.py").write_text("")
+    with pytest.raises(MutatorError, match=r"not committed \(target/new.py\)"):
+        open_study(out, clone)
+
+
+@pytest.mark.parametrize("is_wheel", [True, False])
+def test_without_a_clone_the_study_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_wheel: bool
+) -> None:
+    if is_wheel:
+        (tmp_path / "shipped.zip").touch()
+    monkeypatch.setattr(study_clone, "SHIPPED_ARCHIVE_PATH", tmp_path / "shipped.zip")
+    monkeypatch.setattr(study_clone, "CLONE_FOLDER", tmp_path)
+    with pytest.raises(MutatorError, match="not installed from a git clone"):
+        StudyClone.of_this_package()
+
+
+def test_an_unknown_commit_is_refused(clone: StudyClone) -> None:
+    find: Callable[[str], tuple[str, ...]] = clone.files_changed_since
+    with pytest.raises(MutatorError, match="is not in this clone"):
+        find("ef" * 20)
