@@ -12,10 +12,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.files import make_folder, write_atomic
 from mutator.errors import MutatorError
-from mutator.paper.reproduction.campaign_tables import campaign_tables
+from mutator.paper.reproduction.campaign_tables import rows_of_campaign
 from mutator.paper.reproduction.data_set import write_data_set
 from mutator.paper.reproduction.study_campaigns import STUDY, StudyCampaign
 from mutator.paper.reproduction.study_check import (
@@ -33,7 +34,7 @@ from mutator.paper.reproduction.study_clone import (
     StudyClone,
 )
 from mutator.paper.reproduction.study_driving import drive_study, finished_folders, open_study
-from mutator.paper.reproduction.study_figure import study_figure
+from mutator.paper.reproduction.study_figure import draw_hazard_shares
 from mutator.paper.reproduction.study_tables import combined
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
@@ -48,16 +49,16 @@ def write_study(
 ) -> None:
     """Write tables, pages, figure and data set of a study whose campaigns are finished."""
     folders = finished_folders(out, campaigns)
-    parts = [campaign_tables(each, folders[each.name], workspace, clone.commit) for each in campaigns]
+    parts = [rows_of_campaign(each, folders[each.name], workspace, clone.commit) for each in campaigns]
     rows = write_data_set(out / DATA_SET_FOLDER, clone.root, campaigns, folders, combined(parts))
     tables = combined([*parts, {"data_set": rows}])
     study = pages_of(workspace, campaigns, tables)
     tables.write(docs_root / TABLES_FOLDER)
-    differences = (clone.root / DIFFERENCES_PAGE).read_text(encoding="utf-8")
+    differences = read_bounded(clone.root / DIFFERENCES_PAGE).decode()
     files = {
         RESULTS_PAGE: study.results_page().encode(),
         DIFFERENCES_PAGE: study.with_blocks(differences).encode(),
-        FIGURE: study_figure(study),
+        FIGURE: draw_hazard_shares(study),
     }
     for name, data in files.items():
         make_folder((docs_root / name).parent)

@@ -91,10 +91,10 @@ def describe_observation_margin(observation: JudgedObservation) -> str:
     needed = [claim for claim in observation.claims if claim.claim.needed]
     margins = [(claim.number, *margin) for claim in needed for margin in _margins_of(claim)]
     if observation.verdict is ClaimVerdict.HOLDS:
-        found = [(number, margin) for number, _, margin in margins if margin]
-        if not found:
+        single_changes = [(number, margin) for number, _, margin in margins if margin]
+        if not single_changes:
             return "no single count"
-        number, margin = min(found, key=lambda entry: entry[1].size)
+        number, margin = min(single_changes, key=lambda entry: entry[1].size)
         return f"{number}: {margin.text}"
     parts = [
         f"{number}: {margin.text if margin else 'more runs'}"

@@ -30,7 +30,7 @@ _FRAMES_MODULE = "vision_input"
 _LEAST_RANKED = 3  # fault types
 
 
-def campaign_tables(
+def rows_of_campaign(
     campaign: StudyCampaign, folder: RunFolder, workspace: Workspace, commit: str
 ) -> dict[str, list[Row]]:
     """Return the rows of each table, apart from those about the data set."""
@@ -192,8 +192,8 @@ def _claim_rows(campaign: str, judged: Sequence[JudgedObservation]) -> Iterator[
 def _verdict_on_paper(observation: JudgedObservation) -> str:
     """Return the rules' verdict on the paper's counts, of the claims that have counts."""
     verdicts = [claim.verdict_on_paper for claim in observation.claims if claim.claim.needed]
-    known = [verdict for verdict in verdicts if verdict is not None]
-    return combined_verdict(known).value if known else ""
+    decided = [verdict for verdict in verdicts if verdict is not None]
+    return combined_verdict(decided).value if decided else ""
 
 
 def _seed_rows(campaign: str, frame: "pd.DataFrame") -> Iterator[Row]:

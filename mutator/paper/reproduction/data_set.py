@@ -1,14 +1,15 @@
 """The data set of the study: every experiment of every campaign, with what is needed to read and cite it."""
 
 import gzip
-import hashlib
 import io
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import make_folder, remove_folder, write_atomic
+from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_tables import HEADS, Row, StudyTables
@@ -63,12 +64,12 @@ def write_data_set(
         shutil.copyfile(clone_root / name, folder / name)
     write_atomic(folder / "README.md", _README.encode())
     files = sorted(path.name for path in folder.iterdir())
-    sums = {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in files}
-    text = "".join(f"{digest}  {name}\n" for name, digest in sums.items())
+    sums = {name: digest(read_bounded(folder / name)) for name in files}
+    text = "".join(f"{sha256}  {name}\n" for name, sha256 in sums.items())
     write_atomic(folder / _SUMS_FILE, text.encode())
     rows: list[Row] = [
-        {"file": name, "bytes": str((folder / name).stat().st_size), "sha256": digest}
-        for name, digest in sums.items()
+        {"file": name, "bytes": str((folder / name).stat().st_size), "sha256": sha256}
+        for name, sha256 in sums.items()
     ]
     if (size := sum(int(row["bytes"]) for row in rows)) > MOST_BYTES:
         raise MutatorError(f"a data set of {size:,} bytes", where=folder, expected=f"at most {MOST_BYTES:,}")
@@ -81,7 +82,7 @@ def changed_files(folder: Path, rows: Sequence[Row]) -> list[str]:
         row["file"]
         for row in rows
         if not (path := folder / Path(row["file"]).name).is_file()
-        or hashlib.sha256(path.read_bytes()).hexdigest() != row["sha256"]
+        or digest(read_bounded(path)) != row["sha256"]
     ]
 
 

@@ -132,7 +132,12 @@ class StudyPages:
         rows = [(PAPER, *(_percent(tally, "alerts") for tally in (*published, sum_tallies(published))))]
         for source, tallies in others:
             pairs = zip((*tallies, sum_tallies(tallies)), (*published, sum_tallies(published)), strict=True)
-            rows.append((source, *(_with_difference(ours, theirs, "alerts") for ours, theirs in pairs)))
+            rows.append(
+                (
+                    source,
+                    *(_with_difference(tally, published_tally, "alerts") for tally, published_tally in pairs),
+                )
+            )
         return _markdown(("alerts of activated", *scenarios, "all"), rows)
 
     def kinds_of_alerts_table(self, method: str = GUIDED) -> str:
@@ -181,8 +186,13 @@ class StudyPages:
             ("hazards by fault type: rank correlation with the paper", ALL_TYPES),
             ("the same, types without camera frames", WITHOUT_FRAMES),
         ):
-            cells = [self.tables.rows("agreement", campaign=c.name, fault_types=types) for c in self.whole]
-            rows.append((label, "", *(_interval_text(found[0]) if found else "-" for found in cells)))
+            cells = [
+                "".join(
+                    map(_interval_text, self.tables.rows("agreement", campaign=c.name, fault_types=types))
+                )
+                for c in self.whole
+            ]
+            rows.append((label, "", *(cell or "-" for cell in cells)))
         rows.append(self._total_row("hazards, random", RANDOM, "hazards"))
         heads = ("of activated faults, guided except in the last line", PAPER, *(c.title for c in self.whole))
         return _markdown(heads, rows)
@@ -195,10 +205,10 @@ class StudyPages:
             near: list[str] = []
             far: list[str] = []
             for kind in kinds:
-                ours = _share(self._tally(campaign.name, GUIDED, [kind]), "hazards", "activated").rate
-                theirs = _share(self.published.tally_by_fault_type[GUIDED, kind], "hazards", "activated").rate
-                if ours == ours:  # NaN: not driven
-                    points = 100 * (ours - theirs)
+                tally = self._tally(campaign.name, GUIDED, [kind])
+                published_tally = self.published.tally_by_fault_type[GUIDED, kind]
+                if tally.activated:
+                    points = _points_between(tally, published_tally, "hazards")
                     (near if abs(points) <= NEAR_POINTS else far).append(f"{kind} ({points:+.0f})")
             rows.append((campaign.title, f"{len(near)} of {len(near) + len(far)}", ", ".join(far) or "-"))
         heads = ("campaign", "types within ten points of the paper", "others, with the difference in points")
@@ -295,12 +305,18 @@ def _percent(tally: Tally, part: str) -> str:
     return f"{100 * getattr(tally, part) / tally.activated:.1f} %" if tally.activated else "-"
 
 
-def _with_difference(ours: Tally, theirs: Tally, part: str) -> str:
-    if not ours.activated or not theirs.activated:
+def _with_difference(tally: Tally, published_tally: Tally, part: str) -> str:
+    if not tally.activated or not published_tally.activated:
         return "-"
-    points = 100 * (getattr(ours, part) / ours.activated - getattr(theirs, part) / theirs.activated)
+    points = _points_between(tally, published_tally, part)
     text = f"{points:+.0f}"
-    return f"{_percent(ours, part)} ({f'**{text}**' if abs(points) > NEAR_POINTS else text})"
+    return f"{_percent(tally, part)} ({f'**{text}**' if abs(points) > NEAR_POINTS else text})"
+
+
+def _points_between(tally: Tally, published_tally: Tally, part: str) -> float:
+    """Return the difference of two shares of activated faults, in points."""
+    first, second = (_share(each, part, "activated").rate for each in (tally, published_tally))
+    return 100 * (first - second)
 
 
 def _interval_text(row: Row) -> str:

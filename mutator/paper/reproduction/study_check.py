@@ -1,15 +1,17 @@
 """Checks that pages, tables, runs and data set of the study belong together, and what has changed since."""
 
 import csv
+import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.message_text import counted
 from mutator.audit.run_digests_and_seal import seals_of
 from mutator.errors import MutatorError
 from mutator.paper.published_numbers import load_published_numbers
-from mutator.paper.reproduction.campaign_tables import campaign_tables
+from mutator.paper.reproduction.campaign_tables import rows_of_campaign
 from mutator.paper.reproduction.data_set import changed_files
 from mutator.paper.reproduction.page_rendering import StudyPages
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
@@ -22,7 +24,7 @@ from mutator.paper.reproduction.study_clone import (
     deciding_files,
 )
 from mutator.paper.reproduction.study_driving import finished_folders
-from mutator.paper.reproduction.study_figure import study_figure
+from mutator.paper.reproduction.study_figure import draw_hazard_shares
 from mutator.paper.reproduction.study_tables import StudyTables, combined, load_tables
 from mutator.workspace import Workspace
 
@@ -50,11 +52,11 @@ class StudyCheck:
 
     def _page_problems(self, tables: StudyTables) -> Iterator[str]:
         study = pages_of(self.workspace, self.campaigns, tables)
-        page = (self.docs_root / RESULTS_PAGE).read_text(encoding="utf-8")
+        page = read_bounded(self.docs_root / RESULTS_PAGE).decode()
         yield from _differences(RESULTS_PAGE, page, study.results_page())
-        page = (self.docs_root / DIFFERENCES_PAGE).read_text(encoding="utf-8")
+        page = read_bounded(self.docs_root / DIFFERENCES_PAGE).decode()
         yield from _differences(DIFFERENCES_PAGE, page, study.with_blocks(page))
-        if (self.docs_root / FIGURE).read_bytes() != study_figure(study):
+        if read_bounded(self.docs_root / FIGURE) != draw_hazard_shares(study):
             yield f"{FIGURE}: not the figure of the tables"
 
     def _run_problems(self, tables: StudyTables, out: Path) -> Iterator[str]:
@@ -66,7 +68,7 @@ class StudyCheck:
         [commit] = {row["commit"] for row in tables.rows("runs")} or {""}
         again = combined(
             [
-                *(campaign_tables(c, folders[c.name], self.workspace, commit) for c in self.campaigns),
+                *(rows_of_campaign(c, folders[c.name], self.workspace, commit) for c in self.campaigns),
                 {"data_set": tables.rows("data_set")},
             ]
         )
@@ -84,9 +86,9 @@ def _differences(name: str, page: str, rendered: str) -> Iterator[str]:
     if page == rendered:
         return
     got, expected = page.splitlines(), rendered.splitlines()
-    for number, (mine, theirs) in enumerate(zip(got, expected, strict=False), start=1):
-        if mine != theirs:
-            yield f"{name}:{number}: not what the tables give\n  is:     {mine}\n  should: {theirs}"
+    for number, (line, expected_line) in enumerate(zip(got, expected, strict=False), start=1):
+        if line != expected_line:
+            yield f"{name}:{number}: not what the tables give\n  is:     {line}\n  should: {expected_line}"
             return
     yield f"{name}: {len(got)} lines, and the tables give {len(expected)}"
 
@@ -106,9 +108,8 @@ def changes_since_study(docs_root: Path, clone: StudyClone) -> tuple[str, tuple[
 
 def other_figures(docs_root: Path, clone: StudyClone) -> Iterator[str]:
     """Yield a sentence for each other figure of the docs with a commit: how much has changed since."""
-    with (docs_root / OTHER_FIGURES_FILE).open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    for row in rows:
+    text = read_bounded(docs_root / OTHER_FIGURES_FILE).decode()
+    for row in csv.DictReader(io.StringIO(text, newline="")):
         if row["commit"]:
             changed = deciding_files(clone.files_changed_since(row["commit"]))
             files = (

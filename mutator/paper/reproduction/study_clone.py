@@ -92,9 +92,9 @@ def _without_written(files: Iterable[str]) -> tuple[str, ...]:
 def _git_output(root: Path, *arguments: str) -> str:
     """Return the output of git; '' if it fails or is not installed."""
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             ["git", "-C", str(root), *arguments], capture_output=True, text=True, check=False
         )
     except OSError:
         return ""
-    return done.stdout if done.returncode == 0 else ""
+    return process.stdout if process.returncode == 0 else ""

@@ -17,7 +17,7 @@ _MARKERS = ("D", "o", "s", "s", "^", "^")
 
 
 @shipped_style()
-def study_figure(study: StudyPages) -> bytes:
+def draw_hazard_shares(study: StudyPages) -> bytes:
     """Return the figure as SVG, drawn from the tables alone."""
     kinds = [kind for how, kind in study.published.tally_by_fault_type if how == GUIDED]
     sources: list[tuple[str, dict[str, Tally]]] = [

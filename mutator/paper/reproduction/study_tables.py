@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import make_folder, write_atomic
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
@@ -103,7 +104,7 @@ def load_tables(folder: Path) -> StudyTables:
     for name, heads in HEADS.items():
         path = folder / f"{name}.csv"
         try:
-            text = path.read_text(encoding="utf-8")
+            text = read_bounded(path).decode()
         except (OSError, UnicodeDecodeError):
             raise MutatorError(
                 "no table of the study here",
@@ -122,7 +123,7 @@ def load_tables(folder: Path) -> StudyTables:
         rows_by_name[name] = rows
     tables = StudyTables(rows_by_name=rows_by_name)
     for name, data in tables.file_bytes().items():
-        if (folder / name).read_bytes() != data:
+        if read_bounded(folder / name) != data:
             raise MutatorError(
                 "not as the study writes it", where=folder / name, remedy="restore the file with git"
             )

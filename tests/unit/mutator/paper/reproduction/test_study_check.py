@@ -19,7 +19,7 @@ from mutator.paper.reproduction.study_clone import (
     deciding_files,
 )
 from mutator.paper.reproduction.study_driving import open_study
-from mutator.paper.reproduction.study_figure import study_figure
+from mutator.paper.reproduction.study_figure import draw_hazard_shares
 from mutator.workspace import Workspace
 
 from .made_up_study import CLONE, made_up_pages, made_up_tables
@@ -49,7 +49,7 @@ def clone(tmp_path: Path) -> StudyClone:
     made_up_tables(commit).write(root / TABLES_FOLDER)
     (root / RESULTS_PAGE).write_text(study.results_page())
     (root / DIFFERENCES_PAGE).write_text(study.with_blocks(BLOCKS))
-    (root / FIGURE).write_bytes(study_figure(study))
+    (root / FIGURE).write_bytes(draw_hazard_shares(study))
     return StudyClone(root=root, commit=commit)
 
 
