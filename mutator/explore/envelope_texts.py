@@ -7,6 +7,7 @@ from mutator._common.message_text import SHORT_ID_LENGTH, counted
 from mutator._common.phrase_texts import with_unit
 from mutator._common.table_rendering import TextTable
 from mutator.campaigns.exploration_section import ExploredPlane
+from mutator.explore.cell_results import CellState
 from mutator.explore.challengers import describe_challenger
 from mutator.explore.challenges import TABLE_DURATIONS_S, ChallengedBound
 from mutator.explore.envelope import Envelope
@@ -106,8 +107,10 @@ def describe_validation(envelope: Envelope) -> str:
     driven = sum(cell in envelope.exploration.map.results for cell in validation.drawn)
     if driven < len(validation.drawn):
         return f"{runs}; the validation is unfinished: {driven} of {len(validation.drawn)} drawn cells driven"
-    hazardous = len(envelope.exploration.failures(validation))
-    return f"{runs}; {hazardous} of {len(validation.drawn)} drawn cells hazardous"
+    states = [envelope.exploration.map.state(cell) for cell in validation.drawn]
+    hazardous = f"{states.count(CellState.HAZARDOUS)} of {len(states)} drawn cells hazardous"
+    disengaged = states.count(CellState.DISENGAGED)
+    return f"{runs}; {hazardous}{f', {disengaged} disengaged' if disengaged else ''}"
 
 
 def findings_table(findings: Sequence[Finding], planes: Sequence[ExploredPlane]) -> TextTable:

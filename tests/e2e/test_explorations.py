@@ -287,8 +287,9 @@ canary: {spec: sensor/lane/shifted, scenario: A, hazard: H3, at_s: 0.5}
 def test_a_campaign_explores(toycar: Workspace, tmp_path: Path) -> None:
     """`run` explores, and resumes with nothing to do; verbs that need a plan, and filters, are refused."""
     path = tmp_path / "exploring.yaml"
-    path.write_text(_CAMPAIGN)
+    path.write_text(_CAMPAIGN.replace("points: 4", "points: 4, challengers: [ramp], seeds: 2"))
     run = mutator.run(path, tmp_path / "run", workspace=toycar)
+    assert all(envelope.plane.challengers == ("ramp",) for envelope in run.envelopes)
     assert run.summary and run.summary.exit_code == 0 and run.seal and len(run.records) > 8
     assert run.folder.head.campaign == "exploring"
     assert mutator.run(path, tmp_path / "run", workspace=toycar).seal == run.seal
@@ -311,6 +312,8 @@ def test_a_campaign_explores(toycar: Workspace, tmp_path: Path) -> None:
         ("longest_s: 3", "longest_s: 0.01", "longest_s"),
         ("spec: sensor/lane/*", "spec: sensor/lane/*, values: 3", "without `values`, with `explore`"),
         ("starts: [1]", "starts: []", "starts"),
+        ("points: 4", "points: 4, challengers: [jump]", "challengers"),
+        ("points: 4", "points: 4, seeds: 0", "seeds"),
     ],
 )
 def test_an_exploring_campaign_is_checked(
