@@ -54,7 +54,8 @@ class ChallengedBound:
 
     @property
     def is_lowered(self) -> bool:
-        return self.level != self.bound.top
+        """Whether less is left, as far as it was looked for to the end."""
+        return self.is_complete and self.level != self.bound.top
 
 
 def survived_lines(cells: Sequence[Line], count: int, *, with_longer: bool = False) -> int:

@@ -82,3 +82,18 @@ def test_the_table_has_a_bound_before_and_after_its_challengers() -> None:
     assert row(envelope_of(line, NO_VALUE))["challenged"] == "no"
     panel = panel_of_planes(planes)
     assert "What challengers lowered" in panel.html and "What challengers lowered" in panel.markdown
+
+
+def test_unfinished_challenges_lower_nothing() -> None:
+    """Cut off after any number of runs, table and sentence are of constant errors until all is driven."""
+    plane = replace(MADE_PLANE, challengers=("noise", "ramp"))
+    whole = envelope_of(line, plane, challengers=lambda name, m, d: m < 1.5)
+    challenges = whole.exploration.challenges.results
+    assert len(challenges) > 8
+    begin = whole.run_count
+    for count in range(begin, begin + len(challenges)):
+        cut = envelope_of(line, plane, most_runs=count, challengers=lambda name, m, d: m < 1.5)
+        planes = ExploredPlanes.of_envelopes([cut], {})
+        assert row(cut)["challenged"] == "unfinished" and planes.first_sentence()
+        assert all(c.is_complete for c in cut.challenges if c.is_lowered) and planes.linked_ids
+        panel_of_planes(planes)
