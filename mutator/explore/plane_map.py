@@ -34,6 +34,15 @@ class Profile:
         """Return the number of the first hazardous cell; `cell_count` if there is none."""
         return 0 if self.starts_hazardous else (*self.changes, cell_count)[0]
 
+    def telling_durations(self, cell_count: int) -> list[int]:
+        """Return numbers of durations that tell whether another line is like this one: the middle between two
+        changes, and what is beside the first and the last one.
+        """
+        if not self.changes:
+            return []
+        middles = [(before + after) // 2 for before, after in pairwise(self.changes)]
+        return [self.changes[0] - 1, *middles, min(self.changes[-1], cell_count - 1)]
+
     def resembles(self, other: "Profile") -> bool:
         """Whether lines between these two can be drawn, without another line in between."""
         return (
@@ -141,15 +150,7 @@ class PlaneMap:
         return [state or CellState.UNKNOWN for state in states]
 
     def _draw_between(self, lines: list[Line], below: int, line: int, above: int) -> None:
-        share = (line - below) / (above - below)
-        first, second = self.profile(below), self.profile(above)
-        drawn: list[bool] | None = None
-        if first and second and first.resembles(second):
-            ends = [round(a + share * (b - a)) for a, b in zip(first.changes, second.changes, strict=True)]
-            drawn = [
-                first.starts_hazardous is not (sum(end <= j for end in ends) % 2 == 1)
-                for j in range(len(lines[line]))
-            ]
+        drawn = self.drawn_between(below, line, above)
         for j, state in enumerate(lines[line]):
             if state is not CellState.UNKNOWN:
                 continue
@@ -160,6 +161,43 @@ class PlaneMap:
             if failed[0] is failed[1] or drawn is not None:
                 is_failed = failed[0] if failed[0] is failed[1] or drawn is None else drawn[j]
                 lines[line][j] = _between(is_failed, neighbours)
+
+    def drawn_between(self, below: int, line: int, above: int) -> list[bool] | None:
+        """Return where a line between two searched ones is called hazardous; None if they do not tell."""
+        first, second = self.profile(below), self.profile(above)
+        if not (first and second and self.is_drawn_between(below, above)):
+            return None
+        if first.resembles(second):
+            share = (line - below) / (above - below)
+            ends = [round(a + share * (b - a)) for a, b in zip(first.changes, second.changes, strict=True)]
+            starts_hazardous = first.starts_hazardous
+        else:  # the line between two: where one of them is hazardous
+            ends, starts_hazardous = [min(self.first_hazardous(below), self.first_hazardous(above))], False
+        return [
+            starts_hazardous is not (sum(end <= j for end in ends) % 2 == 1)
+            for j in range(len(self.lattice.durations_s))
+        ]
+
+    def first_hazardous(self, line: int) -> int:
+        """Return the number of the first hazardous duration of a searched line; their count without one."""
+        profile = self.profile(line)
+        count = len(self.lattice.durations_s)
+        return profile.first_hazardous(count) if profile else count
+
+    def is_drawn_between(self, below: int, above: int) -> bool:
+        """Whether what lies between two searched lines follows from them, without another line in between.
+
+        One line between two simple ones with a hazard does, however they differ: it is called hazardous where
+        one of them is, and its cells touch cells of both.
+        """
+        first, second = self.profile(below), self.profile(above)
+        if first is None or second is None:
+            return False
+        if first.resembles(second):
+            return True
+        last_hazardous = max(self.first_hazardous(below), self.first_hazardous(above))
+        are_simple = first.is_simple and second.is_simple and last_hazardous < len(self.lattice.durations_s)
+        return above - below == 2 and are_simple
 
 
 def _between(is_failed: bool, neighbours: Sequence[CellState]) -> CellState:

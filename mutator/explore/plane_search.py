@@ -5,14 +5,21 @@ in nothing. Between two cells that differ, bisection finds the neighbours that d
 differ too much follow: they begin where their neighbours let expect the change.
 """
 
+from bisect import bisect
+from collections import Counter
 from collections.abc import Iterable, Iterator, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import inf
+from typing import TypeAlias
 
 from mutator.explore.cell_results import CellState
+from mutator.explore.hidden_islands import places_to_look
 from mutator.explore.lattice import Cell
-from mutator.explore.plane_map import PlaneMap, Profile
+from mutator.explore.plane_map import MOST_DIFFERENCE, PlaneMap, Profile
+
+# the number of a duration at which a line may change, or those to drive first; None: sweep the line
+Guess: TypeAlias = int | tuple[int, ...] | None
 
 SWEPT_LINES, LEAST_SWEPT_DURATIONS, _CELLS_TO_SWEEP = 7, 8, 56
 
@@ -43,56 +50,94 @@ class PlaneSearch:
         """Return cells to drive, the most telling ones first; empty once the search is over."""
         lines = self._lines()
         by_line = [self._next_in_line(line, guess) for line, guess in lines.items()]
-        by_line += [self._near_misses(line) for line in lines]  # last: they close no line
-        return list(dict.fromkeys(cell for cells in by_line for cell in cells))
+        if any(by_line):
+            return list(dict.fromkeys(cell for cells in by_line for cell in cells))
+        near_misses = (cell for line in lines for cell in self._near_misses(line))
+        places = places_to_look(self.plane, self.plane.cells(sorted(lines)), self.decidable)
+        return list(dict.fromkeys([*near_misses, *places]))
 
-    def _lines(self) -> dict[int, int | None]:
-        """Return the lines to search: None for one to sweep, or where the change of another is expected.
+    def _lines(self) -> dict[int, Guess]:
+        """Return the lines to search, each with where it is expected to change.
 
-        Lines between others follow once these are closed.
+        Lines between others follow once these are closed, and then those that a hazard shows to be unlike
+        their neighbours.
         """
         last = len(self.plane.lattice.magnitudes) - 1
         swept = {*_spread(last + 1, SWEPT_LINES), *self.repaired_lines}
+        while True:
+            lines = self._lines_around(swept)
+            if any(self._next_in_line(line, guess) for line, guess in lines.items()):
+                return lines
+            surprising = self._surprising_lines(sorted(lines))
+            if not surprising:
+                return lines
+            swept |= surprising
+
+    def _lines_around(self, swept: Set[int]) -> dict[int, Guess]:
         # the largest magnitude first, then from both sides towards the middle: it may well be the end
-        lines: dict[int, int | None] = dict.fromkeys(sorted(swept, reverse=True))
-        if any(self._next_in_line(line, None) for line in swept):
-            return lines
-        for below, above in pairwise(sorted(swept)):
-            lines |= self._lines_between(below, above)
+        lines: dict[int, Guess] = dict.fromkeys(sorted(swept, reverse=True))
+        if not any(self._next_in_line(line, None) for line in swept):
+            for below, above in pairwise(sorted(swept)):
+                lines |= self._lines_between(below, above)
         return lines
 
-    def _lines_between(self, below: int, above: int) -> dict[int, int | None]:
-        profiles = self.plane.profile(below), self.plane.profile(above)
-        if above - below < 2 or None in profiles:
+    def _surprising_lines(self, searched: list[int]) -> set[int]:
+        """Return the other lines with a hazard where the searched ones let expect none."""
+        return {
+            line
+            for (line, duration), result in self.plane.results.items()
+            if result.state is CellState.HAZARDOUS
+            and line not in searched
+            and not self._is_expected(searched, line, duration)
+        }
+
+    def _is_expected(self, searched: list[int], line: int, duration: int) -> bool:
+        position = bisect(searched, line)
+        drawn = self.plane.drawn_between(searched[position - 1], line, searched[position])
+        return drawn is None or any(drawn[max(0, duration - MOST_DIFFERENCE) :][: 2 * MOST_DIFFERENCE + 1])
+
+    def _lines_between(self, below: int, above: int) -> dict[int, Guess]:
+        first, second = self.plane.profile(below), self.plane.profile(above)
+        if above - below < 2 or not first or not second or self.plane.is_drawn_between(below, above):
             return {}
-        first, second = profiles
-        assert first and second
-        if first.resembles(second):
-            return {}
-        middle = (below + above) // 2
+        middle = self._middle_line(below, above)
         guess = self._expected_change(first, second)
         lines = {middle: guess}
         if not self._next_in_line(middle, guess):
             lines |= self._lines_between(below, middle) | self._lines_between(middle, above)
         return lines
 
-    def _expected_change(self, first: Profile, second: Profile) -> int | None:
-        """Return the number of the duration at which a line between two simple ones may change."""
-        if not (first.is_simple and second.is_simple):
-            return None
+    def _middle_line(self, below: int, above: int) -> int:
+        """Return the line nearest to the middle, of those that were searched before if there are any."""
+        counts = Counter(line for line, _ in self.plane.results if below < line < above)
+        searched = [line for line, count in counts.items() if count > 1 and any(self.plane.decided(line))]
+        return min(searched or range(below + 1, above), key=lambda i: (abs(2 * i - below - above), i))
+
+    def _expected_change(self, first: Profile, second: Profile) -> Guess:
+        """Return the number of the duration at which a line between two simple ones may change; durations
+        that show whether a line is like one of two others.
+        """
         count = len(self.plane.lattice.durations_s)
+        if not (first.is_simple and second.is_simple):
+            return tuple(sorted({*first.telling_durations(count), *second.telling_durations(count)}))
         ends = first.first_hazardous(count), second.first_hazardous(count)
         # without any change in one of them, the line may have none, which only a sweep shows
         return (sum(ends) + 1) // 2 if max(ends) < self.decidable else None
 
-    def _next_in_line(self, line: int, guess: int | None) -> list[Cell]:
+    def _next_in_line(self, line: int, guess: Guess) -> list[Cell]:
         if guess is None:
             return self._next_in_sweep(line)
+        if isinstance(guess, tuple):
+            around = [(line, j) for j in guess if j < self.decidable]
+            return self._undriven(around) or self._bisections(line)
         around = [(line, j) for j in (guess, guess - 1) if j >= 0]
-        missing = [cell for cell in around if self.plane.state(cell) is None]
+        missing = self._undriven(around)
         if missing or len({is_hazardous for _, is_hazardous in self.plane.decided(line)}) != 1:
             return missing or self._bisections(line)
         return self._next_outward(line, guess)
+
+    def _undriven(self, cells: Iterable[Cell]) -> list[Cell]:
+        return [cell for cell in cells if self.plane.state(cell) is None]
 
     def _next_outward(self, line: int, guess: int) -> list[Cell]:
         """Return the next cell of a line that does not change where its neighbours let expect it, at growing
@@ -100,20 +145,17 @@ class PlaneSearch:
         """
         if self.plane.decided(line)[0][1]:  # hazardous, so it changes at shorter durations, if at all
             durations = [*range_doubling(guess - 1, -1, 0), 0]
-            return [(line, j) for j in durations if self.plane.state((line, j)) is None][:1]
+            return self._undriven((line, j) for j in durations)[:1]
         longest = self.plane.lattice.largest[1]
         durations = [*range_doubling(guess, 1, longest), longest]
-        return [(line, j) for j in durations if self.plane.state((line, j)) is None][
-            :1
-        ] or self._next_in_sweep(line)
+        return self._undriven((line, j) for j in durations)[:1] or self._next_in_sweep(line)
 
     def _next_in_sweep(self, line: int) -> list[Cell]:
         longest = (line, self.plane.lattice.largest[1])
         if self.plane.state(longest) is None:
             return [longest]
         sweep = [(line, j) for j in _spread(self.decidable, self._swept_durations)]
-        missing = [cell for cell in sweep if self.plane.state(cell) is None]
-        return missing or self._bisections(line)
+        return self._undriven(sweep) or self._bisections(line)
 
     @property
     def _swept_durations(self) -> int:

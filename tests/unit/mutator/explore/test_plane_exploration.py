@@ -60,8 +60,8 @@ def test_what_a_validation_contradicts_is_repaired_and_validated_anew() -> None:
     """
 
     def truth(magnitude: float, duration_s: float) -> float | None:
-        # between two lines that are swept
-        is_inside = LATTICE.magnitudes.index(magnitude) in range(10, 15) and 1.0 < duration_s < 3.0
+        # where neither a sweep nor a look comes
+        is_inside = LATTICE.magnitudes.index(magnitude) in range(9, 12) and 1.0 < duration_s < 2.5
         return 30.0 if is_inside else None
 
     plane = exploration_of(validation=200)
@@ -74,7 +74,7 @@ def test_what_a_validation_contradicts_is_repaired_and_validated_anew() -> None:
     cells = plane.cells()
     for line in lines:
         hazardous = [LATTICE.durations_s[j] for j, state in enumerate(cells[line]) if state.is_hazardous]
-        assert hazardous == [duration for duration in LATTICE.durations_s if 1.0 < duration < 3.0]
+        assert hazardous == [duration for duration in LATTICE.durations_s if 1.0 < duration < 2.5]
 
 
 def test_validations_end() -> None:
