@@ -17,12 +17,19 @@ from mutator.paper.published_numbers import PublishedNumbers
 from mutator.paper.reproduction.campaign_tables import ALL_TYPES, WITHOUT_FRAMES
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_tables import HEADS, Row, StudyTables, tally_of_row
+from mutator.paper.reproduction.tally_texts import (
+    AGREEMENT_LABELS,
+    NOTHING,
+    agreement_cells,
+    count_text,
+    percent_text,
+    share_of_tally,
+    with_difference,
+)
 from mutator.statistics.guided_against_random import RANDOM
-from mutator.statistics.shares_with_intervals import Share, share_with_interval
 from mutator.statistics.tallies import Tally, sum_tallies
 
 PAPER = "paper"
-NEAR_POINTS = 10.0  # a rate within so many points of the paper's is called near
 _MEASURES = (
     ("manifested", "manifested"),
     ("hazards", "hazards"),
@@ -108,8 +115,10 @@ class StudyPages:
         for kind in (*kinds, "total"):
             names = kinds if kind == "total" else [kind]
             published = sum_tallies(self.published.tally_by_fault_type[method, name] for name in names)
-            cells = [str(_share(published, part, whole))]
-            cells += [str(_share(self._tally(c.name, method, names), part, whole)) for c in self.whole]
+            cells = [str(share_of_tally(published, part, whole))]
+            cells += [
+                str(share_of_tally(self._tally(c.name, method, names), part, whole)) for c in self.whole
+            ]
             rows.append((kind, *cells))
         return _markdown(("fault type", PAPER, *(c.title for c in self.whole)), rows)
 
@@ -119,7 +128,7 @@ class StudyPages:
         rows = []
         for label, part in _MEASURES:
             for source, tallies in self._tallies_by_source(method, scenarios):
-                cells = [_count_text(tally, part) for tally in (*tallies, sum_tallies(tallies))]
+                cells = [count_text(tally, part) for tally in (*tallies, sum_tallies(tallies))]
                 rows.append((label, source, *cells))
         return _markdown(("measure", "source", *scenarios, "all"), rows)
 
@@ -129,13 +138,13 @@ class StudyPages:
         """
         scenarios = self._scenarios(method)
         (_, published), *others = self._tallies_by_source(method, scenarios)
-        rows = [(PAPER, *(_percent(tally, "alerts") for tally in (*published, sum_tallies(published))))]
+        rows = [(PAPER, *(percent_text(tally, "alerts") for tally in (*published, sum_tallies(published))))]
         for source, tallies in others:
             pairs = zip((*tallies, sum_tallies(tallies)), (*published, sum_tallies(published)), strict=True)
             rows.append(
                 (
                     source,
-                    *(_with_difference(tally, published_tally, "alerts") for tally, published_tally in pairs),
+                    *(with_difference(tally, published_tally, "alerts") for tally, published_tally in pairs),
                 )
             )
         return _markdown(("alerts of activated", *scenarios, "all"), rows)
@@ -198,21 +207,20 @@ class StudyPages:
         return _markdown(heads, rows)
 
     def agreement_table(self) -> str:
-        """Say of each campaign which fault types are within `NEAR_POINTS` of the paper's hazards."""
-        kinds = [kind for how, kind in self.published.tally_by_fault_type if how == GUIDED]
-        rows = []
-        for campaign in self.whole:
-            near: list[str] = []
-            far: list[str] = []
-            for kind in kinds:
-                tally = self._tally(campaign.name, GUIDED, [kind])
-                published_tally = self.published.tally_by_fault_type[GUIDED, kind]
-                if tally.activated:
-                    points = _points_between(tally, published_tally, "hazards")
-                    (near if abs(points) <= NEAR_POINTS else far).append(f"{kind} ({points:+.0f})")
-            rows.append((campaign.title, f"{len(near)} of {len(near) + len(far)}", ", ".join(far) or "-"))
-        heads = ("campaign", "types within ten points of the paper", "others, with the difference in points")
-        return _markdown(heads, rows)
+        """Tabulate what agrees with the paper in guided experiments, and what does not, for each campaign."""
+        published = {
+            kind: tally for (how, kind), tally in self.published.tally_by_fault_type.items() if how == GUIDED
+        }
+        sources = self._tallies_by_source(GUIDED, self._scenarios(GUIDED))
+        columns = []
+        for campaign, (_, by_scenario) in zip((None, *self.whole), sources, strict=True):
+            tallies = {
+                kind: self._tally(campaign.name, GUIDED, [kind]) if campaign else tally
+                for kind, tally in published.items()
+            }
+            columns.append(agreement_cells(tallies, published, sum_tallies(by_scenario)))
+        rows = [(label, *cells) for label, *cells in zip(AGREEMENT_LABELS, *columns, strict=True)]
+        return _markdown(("guided", PAPER, *(c.title for c in self.whole)), rows)
 
     def observations_table(self) -> str:
         """Tabulate each observation's verdict in each campaign, with what would change it."""
@@ -267,7 +275,7 @@ class StudyPages:
 
     def _total_row(self, label: str, method: str, part: str) -> tuple[str, ...]:
         sources = self._tallies_by_source(method, self._scenarios(method))
-        return (label, *(_percent(sum_tallies(tallies), part) for _, tallies in sources))
+        return (label, *(percent_text(sum_tallies(tallies), part) for _, tallies in sources))
 
     def _scenarios(self, method: str) -> list[str]:
         return sorted(name for how, name in self.published.tally_by_scenario if how == method)
@@ -277,46 +285,13 @@ class StudyPages:
         for campaign in self.whole:
             rows = self.tables.rows("scenarios", campaign=campaign.name, method=method)
             by_name = {row["scenario"]: tally_of_row(row) for row in rows}
-            sources.append((campaign.title, [by_name.get(name, _NOTHING) for name in scenarios]))
+            sources.append((campaign.title, [by_name.get(name, NOTHING) for name in scenarios]))
         return sources
 
     def _tally(self, campaign: str, method: str, kinds: Iterable[str]) -> Tally:
         rows: list[Row] = self.tables.rows("fault_types", campaign=campaign, method=method)
         by_name = {row["fault_type"]: tally_of_row(row) for row in rows}
-        return sum_tallies(by_name.get(kind, _NOTHING) for kind in kinds)
-
-
-_NOTHING = Tally(
-    injected=0, activated=0, hazards=0, manifested=0, alerts=0, hazards_no_alerts=0, alerts_no_hazards=0
-)
-
-
-def _share(tally: Tally, part: str, whole: str) -> Share:
-    return share_with_interval(getattr(tally, part), getattr(tally, whole))
-
-
-def _count_text(tally: Tally, part: str) -> str:
-    """Return `35.8 % (1316/3678)`, of the activated faults."""
-    count, of = getattr(tally, part), tally.activated
-    return f"{100 * count / of:.1f} % ({count}/{of})" if of else "-"
-
-
-def _percent(tally: Tally, part: str) -> str:
-    return f"{100 * getattr(tally, part) / tally.activated:.1f} %" if tally.activated else "-"
-
-
-def _with_difference(tally: Tally, published_tally: Tally, part: str) -> str:
-    if not tally.activated or not published_tally.activated:
-        return "-"
-    points = _points_between(tally, published_tally, part)
-    text = f"{points:+.0f}"
-    return f"{_percent(tally, part)} ({f'**{text}**' if abs(points) > NEAR_POINTS else text})"
-
-
-def _points_between(tally: Tally, published_tally: Tally, part: str) -> float:
-    """Return the difference of two shares of activated faults, in points."""
-    first, second = (_share(each, part, "activated").rate for each in (tally, published_tally))
-    return 100 * (first - second)
+        return sum_tallies(by_name.get(kind, NOTHING) for kind in kinds)
 
 
 def _interval_text(row: Row) -> str:

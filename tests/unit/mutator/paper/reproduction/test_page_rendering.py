@@ -1,0 +1,58 @@
+"""Pages of the study have no number that is not in a table."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.paper.reproduction.page_rendering import StudyPages
+from mutator.paper.reproduction.study_clone import DIFFERENCES_PAGE
+from mutator.paper.reproduction.study_tables import Row, StudyTables
+
+from .made_up_study import CLONE, made_up_pages
+
+BLOCK = "<!-- study: {} -->\n<!-- end of study -->"
+
+
+def with_cells(study: StudyPages, name: str, row_index: int, **cells: str) -> StudyPages:
+    """Return the study with other cells in one row of a table."""
+    rows: list[Row] = list(study.tables.rows(name))
+    rows[row_index] = dict(rows[row_index]) | cells
+    return replace(study, tables=StudyTables(rows_by_name=dict(study.tables.rows_by_name) | {name: rows}))
+
+
+def test_every_block_of_the_page_is_rendered_from_tables() -> None:
+    page = (CLONE / DIFFERENCES_PAGE).read_text(encoding="utf-8")
+    names = re.findall(r"<!-- study: (\w+) -->", page)
+    assert names == ["summary", "agreement", "alerts", "seeds", "seed_verdicts", "observations"]
+    assert page.count("<!-- end of study -->") == len(names)
+    rendered = made_up_pages().with_blocks(page)
+    assert rendered != page and made_up_pages().with_blocks(rendered) == rendered
+
+
+def test_a_block_that_no_table_fills_is_refused() -> None:
+    with pytest.raises(MutatorError, match="a block 'weather'"):
+        made_up_pages().with_blocks(BLOCK.format("weather"))
+
+
+def test_a_campaign_with_the_papers_counts_agrees_with_it() -> None:
+    columns = [line.split(" | ") for line in made_up_pages().agreement_table().splitlines()]
+    within, others, _, _, _, equal = (cells[2] for cells in columns[2:])
+    assert (within, others, equal) == ("17 of 17", "none", "all")
+
+
+def test_alerts_far_from_the_papers_are_bold() -> None:
+    """333 of 797 in S2, the paper's count, and 433: 12.5 points more."""
+    study = made_up_pages()
+    places = [(row["campaign"], row["method"], row["scenario"]) for row in study.tables.rows("scenarios")]
+    changed = with_cells(study, "scenarios", places.index(("coded", "guided", "S2")), alerts="433")
+    lines = {line.split(" | ")[0].strip("| "): line for line in changed.alerts_table().splitlines()}
+    assert "54.3 % (**+13**)" in lines["as coded"] and "41.8 % (+0)" in lines["as described"]
+
+
+def test_the_results_page_names_runs_digests_and_fault_free_alerts() -> None:
+    page = made_up_pages().results_page()
+    for text in ("`coded_2_75`", "`" + "c" * 64 + "`", "fcw at 2.00 s", "commit\n`" + "ab" * 6 + "`"):
+        assert text in page, text
+    assert made_up_pages().tables.digest() in page and "| 1.1* |" in page
