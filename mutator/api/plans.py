@@ -4,6 +4,7 @@ from pathlib import Path
 
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.campaigns.campaign_files import load_campaign, load_campaign_study
+from mutator.campaigns.defended_runs import freeze_defended_runs
 from mutator.campaigns.plan import Plan, SeedBySeedPlan, build_plan, load_plan
 from mutator.campaigns.plan_freezing import freeze_plan_with_tally
 from mutator.engines.forkable import reasons_by_unforkable_variant
@@ -31,6 +32,7 @@ def plan(
         return plan
     planning = SeedBySeedPlan(opened_workspace, campaign, choices)
     folder, tally = freeze_plan_with_tally(planning, Path(out), opened_workspace)
+    freeze_defended_runs(opened_workspace, folder, planning.campaign.defence_sets)
     return load_plan(folder, tally)  # reading it back adds the cost measured in this folder, if any
 
 

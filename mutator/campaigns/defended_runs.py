@@ -4,14 +4,15 @@ Each is an ordinary run folder of a target whose tree has the defences of the se
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from mutator._common.bounded_reading import MOST_EXPERIMENT_DATA_BYTES, read_bounded
 from mutator._common.confined_files import not_plain_error, path_below
 from mutator._common.files import make_folder, write_atomic
-from mutator.campaigns.plan_freezing import collect_target_facts
+from mutator._common.folder_locks import lock_run_folder
+from mutator.campaigns.plan_freezing import collect_target_facts, make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.defences.defence_facts import DefenceFacts, set_name
@@ -70,6 +71,19 @@ def open_or_freeze_defended_run(
     inputs = RunInputs.of_run(workspace, folder)
     check_sources(out, folder.head.sources, inputs.digest_by_source())
     return folder
+
+
+def freeze_defended_runs(
+    workspace: Workspace, undefended: RunFolder, sets: Iterable[tuple[str, ...]]
+) -> None:
+    """Make the run folders of sets of defences that are not there yet; MutatorError as in
+    `open_or_freeze_defended_run`.
+    """
+    for names in sets:
+        out = defended_run_path(undefended.path, names)
+        make_run_folder(out)
+        with lock_run_folder(out):
+            open_or_freeze_defended_run(workspace, undefended, names)
 
 
 def plan_problems(folder: RunFolder, undefended: RunFolder) -> Iterator[MutatorError]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from mutator.errors import MutatorError
 from mutator.model import Fault, Injection
+from mutator.mutants.injection_edits import is_in_tree
 from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -54,6 +55,8 @@ class FaultPositions:
         return tuple(map(self._of_injection, fault.injections))
 
     def _of_injection(self, injection: Injection) -> SourcePosition:
+        if not is_in_tree(injection, self.manifest.tree):
+            return SourcePosition(path=injection.location.path, first_line=1, last_line=1)
         file = parsed_file(self.manifest.tree, injection.location.path)
         first_line, last_line = numbered_lines(file, injection)
         path = path_in_repository(file.full_path)

@@ -14,9 +14,22 @@ DEFENCE_MODULE_NAME = "_fd"  # reserved for the module that runs the defences of
 _INVALID_SOURCE_ERRORS = (SyntaxError, ValueError, RecursionError, MemoryError)
 
 
+def defence_module_name(defence: str) -> str:
+    """Return the name of the module that has a defence's model in a defended tree."""
+    return f"{DEFENCE_MODULE_NAME}_{defence}"
+
+
+def defence_at(path: str) -> str:
+    """Return the defence whose model has this path in a defended tree; empty for a file of the target."""
+    name = path.rpartition("/")[2].removesuffix(".py")
+    prefix = defence_module_name("")
+    return name.removeprefix(prefix) if name.startswith(prefix) else ""
+
+
 def location_as_yaml(location: FaultLocation) -> dict[str, Any]:
     anchor = location.anchor
-    keys: dict[str, Any] = {"file": location.path}
+    defence = defence_at(location.path)
+    keys: dict[str, Any] = {"defence": defence} if defence else {"file": location.path}
     keys |= {"function": location.function} if location.function else {}
     keys[anchor.kind.value] = anchor.name if anchor.kind is not AnchorKind.ENTRY else True
     if anchor.which is not None:

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from mutator.config.location_syntax import is_assignable, is_dotted_name, is_expression
+from mutator.config.location_syntax import defence_module_name, is_assignable, is_dotted_name, is_expression
 from mutator.config.yaml_files import StrictModel
 from mutator.config.yaml_source_lines import KeyPath, YamlSource
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
@@ -24,7 +24,12 @@ class LocationModel(StrictModel, title="A place"):
     of expressions. Write names as in the source (`gap`, `self.angle`, `frames.extend`).
     """
 
-    file: str = Field(description="A file of the target, relative to its root.")
+    file: str | None = Field(None, description="A file of the target, relative to its root.")
+    defence: str | None = Field(
+        None,
+        description="Instead of `file`: a [defence](defence.md), whose model the fault changes. In a tree "
+        "without this defence, the injection does nothing.",
+    )
     function: str | None = Field(
         None,
         description="A qualified name: `measure`, `Sonar.measure`, `outer.<locals>.inner`. Required by every "
@@ -116,7 +121,21 @@ class LocationModel(StrictModel, title="A place"):
             )
         function = self._function_of(kind, source, keys)
         anchor = Anchor(kind=kind, name=name, nth=self.nth, which=which)
-        return FaultLocation(path=self.file, function=function, anchor=anchor)
+        return FaultLocation(path=self._path(source, keys), function=function, anchor=anchor)
+
+    def _path(self, source: YamlSource, keys: KeyPath) -> str:
+        if (self.file is None) == (self.defence is None):
+            raise source.error(
+                keys,
+                "neither `file` nor `defence`" if self.file is None else "both `file` and `defence`",
+                expected="one of them",
+                remedy="name a file of the target, or the defence whose model the fault changes",
+            )
+        if self.defence is None:
+            return self.file or ""
+        if not self.defence.isidentifier():
+            raise source.error((*keys, "defence"), f"'{self.defence}'", expected="the name of a defence")
+        return f"{defence_module_name(self.defence)}.py"
 
     def _function_of(self, kind: AnchorKind, source: YamlSource, keys: KeyPath) -> str:
         name = self.function

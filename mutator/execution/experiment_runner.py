@@ -21,6 +21,7 @@ from mutator.execution.records_without_outcome import (
 )
 from mutator.faults.fault_models import FaultModels
 from mutator.model import AfterHazard, AgainstGolden, Experiment, ObservedActivation, Record, Status
+from mutator.mutants.injection_edits import is_in_tree
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe_contract import activation_of
 from mutator.outcomes import golden_trace_comparison, trace_and_record_loading
@@ -268,7 +269,8 @@ class ExperimentRunner:
         )
 
     def _injections_that_raise(self, experiment: Experiment, mutant: Mutant) -> set[str]:
-        models = [self.models.get(injection.model) for injection in experiment.fault.injections]
+        tree, injections = self.manifest.tree, experiment.fault.injections
+        models = [self.models.get(each.model) for each in injections if is_in_tree(each, tree)]
         return {name for name, model in zip(mutant.injection_ids, models, strict=True) if model.raises}
 
     def _build_record(

@@ -14,6 +14,7 @@ from mutator.errors import MutatorError
 from mutator.faults.message_places import changes_messages, describe_message
 from mutator.model import Experiment, FaultLocation, Status
 from mutator.mutants.execution_counting_mutant import build_counting_mutant
+from mutator.mutants.injection_edits import is_in_tree
 from mutator.mutants.probe_contract import was_triggered
 from mutator.outcomes.inactivity_reasons import UNTRIGGERED_REASON, Reach, reach_of_place
 
@@ -39,7 +40,9 @@ class InactivityCheck:
         unset = probe_report.get("unset")
         if isinstance(unset, dict) and unset:
             return "; ".join(dict.fromkeys(map(str, unset.values())))
-        locations = _locations(experiment)
+        locations = self._locations(experiment)
+        if not locations:
+            return "the defence that it changes is not in the tree"
         key = (
             experiment.scenario,
             experiment.scenario_digest,
@@ -55,7 +58,7 @@ class InactivityCheck:
         limited = any(i.where or i.call or i.every for i in experiment.fault.injections)
         selected = " and `where`, `call` or `every` selects it" if limited else ""
         texts = []
-        for location, (reach, text) in zip(_locations(experiment), places, strict=False):
+        for location, (reach, text) in zip(self._locations(experiment), places, strict=False):
             awaited = self._awaited_messages(experiment, location)
             texts.append(f"{text}{selected}{awaited}" if reach is Reach.IN_RUN else text)
         return "; ".join(dict.fromkeys(texts))
@@ -109,6 +112,6 @@ class InactivityCheck:
         if self._engine is not None:
             self._engine.close()
 
-
-def _locations(experiment: Experiment) -> tuple[FaultLocation, ...]:
-    return tuple(dict.fromkeys(injection.location for injection in experiment.fault.injections))
+    def _locations(self, experiment: Experiment) -> tuple[FaultLocation, ...]:
+        tree, injections = self._arguments.manifest.tree, experiment.fault.injections
+        return tuple(dict.fromkeys(each.location for each in injections if is_in_tree(each, tree)))

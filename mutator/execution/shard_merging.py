@@ -12,6 +12,8 @@ from mutator._common.files import json_bytes, raising_disk_full, read_json, writ
 from mutator._common.folder_locks import lock_run_folder
 from mutator._common.message_text import counted
 from mutator.audit.run_digests_and_seal import UNSEALED_KEYS_BY_FILE, without_keys
+from mutator.campaigns.bench_files import load_campaign_of_run
+from mutator.campaigns.defended_runs import defended_run_path
 from mutator.campaigns.plan_freezing import make_run_folder
 from mutator.campaigns.run_provenance import version_error
 from mutator.errors import CheckFailed, MutatorError
@@ -40,7 +42,8 @@ _SHARDS_REMEDY = "give the folder of each shard of one plan exactly once"
 
 
 def merge_shards(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -> Path:
-    """Merge the run folders `shards` into the new or empty folder `out`; return the path of its results.csv.
+    """Merge the run folders `shards`, and those of their sets of defences, into the new or empty folder
+    `out`; return the path of its results.csv.
 
     Raises MutatorError for a shard that is missing, duplicate, unfinished, in use, or of another plan; unless
     `accept_versions`, also for one that ran with different versions. Raises CheckFailed if a proof failed, or
@@ -57,8 +60,22 @@ def merge_shards(shards: Sequence[Path], out: Path, *, accept_versions: bool = F
     if not shards:
         raise MutatorError("no run folder", argument="shards", remedy=_SHARDS_REMEDY)
     folders = [_open_shard(path) for path in shards]
-    _check_same_plan(folders)
-    _check_shard_numbers(folders)
+    sets = load_campaign_of_run(folders[0]).defence_sets
+    folders_by_set = {
+        names: [_open_shard(defended_run_path(shard.path, names)) for shard in folders] for names in sets
+    }
+    for same_plan in (folders, *folders_by_set.values()):
+        _check_same_plan(same_plan)
+        _check_shard_numbers(same_plan)
+        for folder in same_plan:
+            _check_shard_finished(folder)
+    results = _merge(folders, out, accept_versions=accept_versions)
+    for names, defended in folders_by_set.items():
+        _merge(defended, defended_run_path(out, names), accept_versions=accept_versions)
+    return results
+
+
+def _merge(folders: Sequence[RunFolder], out: Path, *, accept_versions: bool) -> Path:
     with ExitStack() as stack:
         for folder in folders:
             stack.enter_context(lock_run_folder(folder.path, patience_s=0.0))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from mutator._common.message_text import describe_choices, spelling_suggestion
 from mutator.config.instance_conditions import canonical_instance_condition
+from mutator.config.location_syntax import defence_at
 from mutator.config.yaml_source_lines import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels
@@ -16,14 +17,15 @@ _READER_PARAMS = ("queue", "message", "topic", "name")  # parameters of fault mo
 
 
 def locate_injection(injection: InjectionSpec, manifest: TargetManifest, source: YamlSource) -> InjectionSpec:
-    """Return the injection at the place where its message is read; others unchanged.
+    """Return the injection at the place where its message is read, or in the model of its defence; others
+    unchanged.
 
     The reader's variables become parameters, and its `where` part of the injection's. MutatorError with file
     and line if the manifest declares no such reader or topic, or if the spec sets these parameters, too.
     """
     place = injection.message
     if place is None:
-        return injection
+        return _in_package_of_defences(injection, manifest)
     keys = (*injection.keys, "message")
     readers, declared = manifest.message_readers, f"declared in `messages` of {manifest.path.name}"
     if place.reader not in readers:
@@ -57,6 +59,14 @@ def locate_injection(injection: InjectionSpec, manifest: TargetManifest, source:
         params=(*injection.params, *_params_of(reader, place.topic, injection)),
         where=_both(reader.where, injection.where),
     )
+
+
+def _in_package_of_defences(injection: InjectionSpec, manifest: TargetManifest) -> InjectionSpec:
+    """Return an injection at a defence with the path that its model has in defended trees."""
+    location, package = injection.location, manifest.probe_package
+    if location is None or package is None or not defence_at(location.path) or "/" in location.path:
+        return injection
+    return replace(injection, location=replace(location, path=f"{package}/{location.path}"))
 
 
 def check_changes_messages(located: InjectionSpec, model: FaultModel, models: FaultModels) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from mutator._common.message_text import describe_choices
 from mutator._common.random_streams import random_generator
 from mutator.config import units
+from mutator.config.location_syntax import defence_at
 from mutator.config.phrases_yaml import check_holes
 from mutator.config.yaml_source_lines import KeyPath
 from mutator.errors import MutatorError
@@ -175,7 +176,8 @@ class _SpecExpander:
         try:
             model = self.models.get(injection.model)
             keys = (*injection.keys, *(("message",) if injection.message else ("at", "file")))
-            check_location_allowed(self.manifest, location)
+            if not defence_at(location.path):  # where a defence is, the checks before a run look
+                check_location_allowed(self.manifest, location)
             if injection.message:
                 check_changes_messages(located, model, self.models)
             for param in injection.params:

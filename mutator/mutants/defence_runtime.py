@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from mutator.config.location_syntax import DEFENCE_MODULE_NAME
+from mutator.config.location_syntax import DEFENCE_MODULE_NAME, defence_module_name
 from mutator.defences.defence import Defence, Sense
 from mutator.errors import MutatorError
 from mutator.mutants.template_rendering import render_template
@@ -15,11 +15,6 @@ from mutator.triggers.conditions import TIME, to_python_source
 def module_path(package: str | None, name: str) -> str:
     """Return the path of a defence's module in a tree; without a package, it is at the tree's root."""
     return f"{package}/{name}.py" if package else f"{name}.py"
-
-
-def defence_module_name(defence: str) -> str:
-    """Return the name of the module with a defence's model."""
-    return f"{DEFENCE_MODULE_NAME}_{defence}"
 
 
 def defence_module_names(defences: Sequence[Defence]) -> list[str]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from mutator.config.instance_conditions import names_in_condition
-from mutator.config.location_syntax import base_variable
+from mutator.config.location_syntax import base_variable, defence_at
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind, TemplateNeed
 from mutator.model import LOAD_TIME_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
@@ -54,18 +54,26 @@ class InjectionEdit:
 def edits_of(
     manifest: TargetManifest, models: FaultModels, injections: Sequence[Injection]
 ) -> list[InjectionEdit]:
-    """Return the edits of a fault's injections, in order. Only here does a fault's value enter a mutant.
+    """Return the edits of a fault's injections, in order. Only here does a fault's value enter a mutant. An
+    injection into a defence that the tree does not have has none.
 
     MutatorError as `injection_edit`, and for a location outside the target or where no fault can act.
     """
     edits = []
     for index, injection in enumerate(injections):
+        if not is_in_tree(injection, manifest.tree):
+            continue
         check_location_allowed(manifest, injection.location)
         check_place_can_be_hit(manifest, injection.location)
         name, file = injection_id(index, injection), parsed_file(manifest.tree, injection.location.path)
         edit = injection_edit(file, models, injection, name, manifest.tree)
         edits.append(InjectionEdit(id=name, file=file, edit=edit))
     return edits
+
+
+def is_in_tree(injection: Injection, tree: SourceTree) -> bool:
+    """Return whether a tree has the defence that an injection changes. True for a place in the target."""
+    return not defence_at(injection.location.path) or injection.location.path in tree.files
 
 
 def injection_edit(

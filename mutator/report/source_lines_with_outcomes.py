@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from mutator.campaigns.fault_positions import numbered_lines
 from mutator.errors import MutatorError
 from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Outcome, Status
+from mutator.mutants.injection_edits import is_in_tree
 from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
 from mutator.results.outcome_counting import outcome_or_status_of_rows
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
@@ -117,7 +118,8 @@ class SourceLines:
         results: "DataFrame",
         changes: Mapping[str, str],
     ) -> "SourceLines":
-        line_by_fault = {name: _line_of(manifest, fault) for name, fault in faults.items()}
+        lines = {name: _line_of(manifest, fault) for name, fault in faults.items()}
+        line_by_fault = {name: line for name, line in lines.items() if line}
         marks: dict[str, dict[int, dict[str, LineMark]]] = {path: {} for path, _ in line_by_fault.values()}
         for (path, line), lasting, mark in _line_marks(line_by_fault, results):
             marks[path].setdefault(line, {})[lasting] = mark
@@ -133,8 +135,11 @@ class SourceLines:
         )
 
 
-def _line_of(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
-    first = fault.injections[0]
+def _line_of(manifest: TargetManifest, fault: Fault) -> tuple[str, int] | None:
+    """Return file and line of the first injection; None if it is in a defence that the tree does not have."""
+    first = next((each for each in fault.injections if is_in_tree(each, manifest.tree)), None)
+    if first is None:
+        return None
     file = parsed_file(manifest.tree, first.location.path)
     return file.path, numbered_lines(file, first)[0]
 

@@ -62,6 +62,7 @@ def function_sources(tree: SourceTree, locations: Iterable[FaultLocation]) -> di
             tree.files[location.path], location.function
         ).decode("utf-8", "surrogateescape")
         for location in locations
+        if location.path in tree.files  # a defence is in defended trees only
     }
 
 

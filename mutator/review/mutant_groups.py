@@ -239,7 +239,8 @@ class _GroupBuilder:
         calls: dict[str, str] = {}
         for fault in faults:
             mutant = build(self.manifest, self.models, fault, always_trigger())
-            for path in dict.fromkeys(i.location.path for i in fault.injections):
+            paths = dict.fromkeys(i.location.path for i in fault.injections)
+            for path in (path for path in paths if path in mutant.files):
                 calls |= self._called_code.called_by_injected_lines(path, mutant.files[path])
         injections = faults[0].injections
         return BasisTexts(

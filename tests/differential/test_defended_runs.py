@@ -11,6 +11,7 @@ import mutator
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Outcome
+from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -140,3 +141,107 @@ def test_outcomes_of_both_runs_can_be_compared(places: tuple[Workspace, Path]) -
     assert runs[0].keys() == runs[1].keys()
     outcomes = [[record.outcome for record in records.values()] for records in runs]
     assert outcomes[0].count(Outcome.HAZARD) > outcomes[1].count(Outcome.HAZARD)
+
+
+MODEL = """\
+class Model:
+    def __init__(self, *, level):
+        self.level = level
+
+    def reset(self):
+        pass
+
+    def update(self, since_s, sensed, applied):
+        level = self.level
+        return {"brake": (level, float("inf")), "gas": (0.0, 0.0)}
+"""
+SPEC = """\
+schema: fault_spec/1
+module: sensor
+fault_type: blind
+about: The sensor is wrong, and the emergency brake does not brake.
+variants:
+  both:
+    aim: H1
+    about: The other car seems far away, and the brake fails.
+    as_described:
+      injections:
+        - at: {file: toycar/sensing.py, function: Sensor.sense, after_assign: gap}
+          model: offset
+          unit: m
+          params: {by_m: 60}
+        - at: {defence: emergency_brake, function: Model.update, after_assign: level}
+          model: stuck
+          unit: "1"
+          params: {target: level, value: 0.0}
+"""
+
+
+@pytest.mark.parametrize("engine", ["fork", "reference"])
+def test_a_fault_in_a_defence_makes_it_prevent_nothing(
+    copy_toycar: CopyToycar, tmp_path: Path, engine: str
+) -> None:
+    """In the undefended tree, the fault has only its other injection; both runs have the same experiments."""
+    workspace = copy_toycar(tmp_path)
+    (workspace.templates / "defences" / "own.py").write_text(MODEL)
+    (workspace.library / "faults" / "sensor" / "blind.yaml").write_text(SPEC)
+    path = workspace.defences["emergency_brake"]
+    text = path.read_text().replace("constant_command", "own").replace("lowest_brake", "level")
+    path.write_text(text)
+    campaign = workspace.campaign("defended")
+    text = campaign.read_text().replace(", [pedal_limit, emergency_brake]", "")
+    campaign.write_text(text.replace("spec: sensor/silence/no_data", "spec: sensor/blind/both"))
+    run = tmp_path / "run"
+    assert run_campaign(workspace, "defended", run, engine=engine).exit_code == 0
+    folders = [RunFolder.open(each) for each in (run, run / "defended" / "emergency_brake")]
+    undefended, defended = (folder.records() for folder in folders)
+    blind = {
+        e.id
+        for e in plan_file.load_experiments(run)
+        if e.fault.spec == "sensor/blind/both" and "H1" in dict(undefended[e.id].hazards)
+    }
+    assert blind
+    for name in blind:
+        assert "H1" in dict(defended[name].hazards)
+        assert b"_fd_emergency_brake" in (folders[1].read_patch(name, defended[name]) or b"")
+        assert b"_fd" not in (folders[0].read_patch(name, undefended[name]) or b"")
+
+
+@pytest.mark.slow
+def test_shards_are_merged_with_their_sets(places: tuple[Workspace, Path], tmp_path: Path) -> None:
+    """The merged folder has the same results as a single run, in each set, too."""
+    from mutator.execution.shard_merging import merge_shards
+    from mutator.store.plan_choices import Choices
+
+    shards = [tmp_path / "1", tmp_path / "2"]
+    for number, shard in enumerate(shards, 1):
+        choices = Choices(shard=f"{number}/2")
+        assert run_campaign(places[0], "defended", shard, choices=choices).exit_code == 0
+    merge_shards(shards, tmp_path / "out")
+    assert results_of_all(tmp_path / "out") == results_of_all(places[1])
+
+
+def test_a_plan_freezes_the_sets(copy_toycar: CopyToycar, tmp_path: Path) -> None:
+    """The folders are there before anything runs, and each verb opens them."""
+    workspace = copy_toycar(tmp_path)
+    plan = mutator.plan("defended", tmp_path / "run", workspace=workspace)
+    for name in SETS:
+        assert RunFolder.open(tmp_path / "run" / "defended" / name).head.plan == plan.digest
+
+
+def test_an_unknown_defence_is_refused_before_anything_is_planned(
+    copy_toycar: CopyToycar, tmp_path: Path
+) -> None:
+    workspace = copy_toycar(tmp_path)
+    path = workspace.campaign("defended")
+    path.write_text(path.read_text().replace("[none, emergency_brake,", "[none, emergency_brakes,"))
+    with pytest.raises(MutatorError, match=r"defended\.yaml:\d+: no defence 'emergency_brakes'; .*one of"):
+        mutator.plan("defended", tmp_path / "run", workspace=workspace)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_same_bytes(places: tuple[Workspace, Path], tmp_path: Path) -> None:
+    run = mutator.run("defended", tmp_path / "run", cluster="local:2", reuse=False, workspace=places[0])
+    assert run.summary and run.summary.exit_code == 0
+    assert results_of_all(tmp_path / "run") == results_of_all(places[1])

@@ -125,6 +125,8 @@ def _growing_parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iter
         "sandbox": workspace.sandbox,
         "include": as_json_types(head.include),
         "severity": as_json_types(folder.severity_scale),
+        "defences": dict(manifest.defences),
+        "defence_files": sorted(manifest.defence_files),
     }
     for name in sorted({golden_run.scenario for golden_run in folder.golden_runs}):
         yield f"scenarios/{name}.yaml", read_bounded(workspace.scenario(name))
@@ -192,8 +194,9 @@ def load_run_inputs(bundle: UnpackedBundle) -> RunInputs:
         overlay if overlay.is_dir() else None,
     )
     check_column_names(manifest)
+    manifest = replace(manifest, sandbox=bundle.meta["sandbox"], defences=bundle.meta["defences"])
     return RunInputs(
-        manifest=replace(manifest, sandbox=bundle.meta["sandbox"]),
+        manifest=replace(manifest, defence_files=bundle.defence_files),
         fault_models=load_fault_models(bundle.folder / "templates"),
         scenario_files={
             golden.scenario: bundle.scenario_path(golden.scenario)

@@ -5,6 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import checked_relative_path, path_below
 from mutator._common.files import read_json
 from mutator._common.typed_json import typed_value_from_json
@@ -18,6 +19,7 @@ from mutator.targets.hazard_severity import SeverityScale
 BUNDLE_SCHEMA = "bundle/1"
 META_FILE = "meta.json"
 _META_KEYS = {"are_limits_measured", "engine", "include", "seed", "series", "several_seeds", "severity"}
+_META_KEYS |= {"defences", "defence_files"}
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,8 @@ class UnpackedBundle:
         try:
             checked_relative_path(meta["manifest"], path, allow_folders=False)
             goldens = [(GoldenRun.from_stored(entry["golden"]), entry["digest"]) for entry in meta["goldens"]]
-            for golden, _ in goldens:
-                checked_relative_path(golden.key, path)
+            for name in (*(golden.key for golden, _ in goldens), *meta["defence_files"]):
+                checked_relative_path(name, path)
             if Limits(**meta["limits"]) and meta.keys() >= _META_KEYS:
                 return meta
         except (KeyError, TypeError, ValueError):
@@ -54,6 +56,18 @@ class UnpackedBundle:
             include=GoldenClass(include) if include else None,
             scale=typed_value_from_json(SeverityScale, scale) if scale else None,
         )
+
+    @property
+    def defence_files(self) -> dict[str, bytes]:
+        """The files that defences add to the target's tree, or change, by path."""
+        places = {
+            name: [path_below(self.folder / part, name) for part in ("overlay", "target")]
+            for name in self.meta["defence_files"]
+        }
+        return {
+            name: read_bounded(next(path for path in paths if path.is_file()))
+            for name, paths in places.items()
+        }
 
     def scenario_path(self, name: str) -> Path:
         return path_below(self.folder / "scenarios", f"{name}.yaml")
