@@ -74,10 +74,10 @@ def drive(glitch: Glitch, plant: str, *, reset_after_jump: bool = False, gap: fl
 def _disturb(simulator: Simulator, glitch: Glitch) -> None:
     measure = simulator._sensors.measure
 
-    def disturbed(truth: GroundTruth, button: int, frame: int) -> list[CanFrame]:
+    def disturbed(truth: GroundTruth, button: int, frame: int, brake_pedal: float) -> list[CanFrame]:
         if 0 <= frame - glitch.start < glitch.steps:
             truth = truth._replace(v_ego=max(truth.v_ego - glitch.mph * MPH_TO_MS, SLOWEST))
-        return measure(truth, button, frame)
+        return measure(truth, button, frame, brake_pedal)
 
     setattr(simulator._sensors, "measure", disturbed)  # noqa: B010
 

@@ -16,14 +16,14 @@ def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
     assert answer.code == 0, answer.err
     for wanted in (
         "accidents (3)",
-        "hazards (3)",
+        "hazards (4)",
         "hwt > 2.0 and rs > 0.0",
         "the contexts cover everything exactly once: proved in 9 cells",
-        "unsafe control actions (14)",
+        "unsafe control actions (15)",
         "vision_output/camera_unavailable",
         "none: Drivers are not simulated",
         "control structure: structure.svg",
-        "all well: 22 causal factors, 27 fault specs",
+        "all well: 23 causal factors, 27 fault specs",
     ):
         assert wanted in answer.out
     assert (nowhere / "structure.svg").read_text().startswith("<svg ")

@@ -50,7 +50,7 @@ def test_the_digest_covers_file_and_model(toycar: Workspace) -> None:
         ("role: driver\n", "", "'role' is missing"),
         ("role: driver", "role: helper", "helper"),
         ("name: d", "name: e", "'e'; expected 'd', the name of the file"),
-        ("model: constant_command", "model: nothing", "'nothing'; expected one of constant_command"),
+        ("model: constant_command", "model: nothing", "'nothing'; expected one of .*constant_command"),
         ("truth: d_rel", "truth: d_rell", "'d_rell'; expected one of d_rel, v_ego, v_lead, hwt, rs"),
         ("truth: d_rel", "truth: t", "'t'; expected one of d_rel"),
         ("controller: gap_read", "controller: gap", "'gap'; expected one of gap_read, closing_read"),

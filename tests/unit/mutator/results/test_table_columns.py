@@ -11,7 +11,7 @@ from mutator.workspace import Workspace
 OF_OPENPILOT = (
     "experiment_id, fault_id, module, fault_type, reading, value, unit, scenario, method, trigger, seed, "
     "status, outcome, activated, t_activation, activations, manifested, t_manifest, h1, t_h1, h2, t_h2, "
-    "h3, t_h3, alerts, t_alert, reaction_time, max_dev_gas, max_dev_brake, max_dev_steer, "
+    "h3, t_h3, h4, t_h4, alerts, t_alert, reaction_time, max_dev_gas, max_dev_brake, max_dev_steer, "
     "variant, aim, condition, hold, hold_s, first_actuator, first_change, first_change_share, detail"
 )
 
