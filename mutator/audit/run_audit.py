@@ -22,6 +22,7 @@ from mutator.audit.record_audit import load_stored_records, mutant_problems, pro
 from mutator.audit.run_digests_and_seal import golden_digests
 from mutator.audit.scenario_audit import family_problems, planned_scenario_problems
 from mutator.audit.series_audit import audit_series
+from mutator.audit.strata_audit import drawn_strata_problems, planned_strata_problems
 from mutator.audit.table_audit import audit_tables
 from mutator.campaigns.plan import load_plan
 from mutator.campaigns.plan_freezing import PLAN_CSV, plan_csv_bytes
@@ -102,7 +103,9 @@ def run_audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Aud
     ]
     if workspace and manifest:
         fact_problems = chain(
-            target_fact_problems(folder, workspace, manifest), family_problems(folder, workspace)
+            target_fact_problems(folder, workspace, manifest),
+            family_problems(folder, workspace),
+            drawn_strata_problems(folder, workspace),
         )
         checks.append(
             AuditCheck.from_problems("facts about the target that follow from the library", 1, fact_problems)
@@ -193,6 +196,7 @@ def _plan_problems(folder: RunFolder) -> Problems:
         )
         yield MutatorError(f"{key} {shortened_text(stored)}", where=run / HEAD, expected=expected)
     yield from planned_scenario_problems(folder, plan)
+    yield from planned_strata_problems(folder, plan)
     if FileDigest.of_file(run / PLAN_CSV) != FileDigest.of_bytes(plan_csv_bytes(plan)):
         yield MutatorError(
             "differs from the plan",

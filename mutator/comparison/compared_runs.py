@@ -1,6 +1,7 @@
 """A run's experiments and results, as one side of a comparison."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from mutator.results.result_rows import ResultRow, rows_of
 from mutator.results.table_reader import frame_of_experiments
 from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.store import plan_file
+from mutator.store.plan_strata import Stratum, load_strata, stratum_of
 from mutator.store.preflight_results import check_verdicts_are_final
 from mutator.store.run_folder import RunFolder
 from mutator.targets.hazard_severity import SeverityScale
@@ -46,6 +48,20 @@ class ComparedRun:
     @property
     def name(self) -> str:
         return self.folder.path.name
+
+    @cached_property
+    def stratum_by_id(self) -> dict[str, tuple[Stratum, int]] | None:
+        """The stratum of each experiment, and how many were planned in it before the draw; None without a
+        sample.
+        """
+        strata = load_strata(self.folder.path)
+        if strata is None:
+            return None
+        names = {
+            e.id: stratum_of(strata.draw, e.fault.spec, e.family_or_scenario, e.method.value)
+            for e in self.experiments
+        }
+        return {name: (stratum, strata.size_by_stratum[stratum]) for name, stratum in names.items()}
 
     def classified_by(self, scale: SeverityScale | None) -> "ComparedRun":
         """Return this side with hazards classified by `scale`, or unclassified if it is None."""

@@ -12,8 +12,10 @@ from mutator.model import Outcome, Status
 from mutator.results.result_rows import ResultRow
 from mutator.statistics.guided_against_random import holm_adjusted
 from mutator.statistics.paired_statistics import mcnemar_test, paired_times, rate_difference
-from mutator.statistics.shares_with_intervals import share_with_interval
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
+from mutator.statistics.weighted_shares import share_of_runs
+from mutator.store.plan_strata import Stratum
 
 TIME_COLUMN_BY_EVENT = {
     "activated": "t_activation",
@@ -25,16 +27,20 @@ TIME_COLUMN_BY_EVENT = {
 TIME_SPAN_NAMES = ("activation to manifest", "activation to alert", "activation to hazard", "alert to hazard")
 
 
-def usable_pair_events(pairs: Sequence[ExperimentPair]) -> pd.DataFrame:
+def usable_pair_events(
+    pairs: Sequence[ExperimentPair], stratum_by_id: Mapping[str, tuple[Stratum, int]] | None = None
+) -> pd.DataFrame:
     """Return a frame with a row for each pair that has valid results in both runs.
 
-    Columns: `kind` (`sensor/bias`), `fault` (the resampling unit: variant and value), flags `activated_a`,
-    `activated_b` etc., times `activation to hazard_a` etc. in s (NaN if either event is missing).
+    Columns: `kind` (`sensor/bias`), `fault_id` (the resampling unit: variant and value), flags `activated_a`,
+    `activated_b` etc., times `activation to hazard_a` etc. in s (NaN if either event is missing). If the
+    first run is a sample, `stratum_by_id` has the stratum of each of its experiments, with the stratum's
+    size, and the column `weight` says how many planned experiments a pair stands for.
     """
     rows = [
         {
             "kind": p.row_a.kind,
-            "fault": p.row_a.fault,
+            "fault_id": p.row_a.fault,
             **_event_cells(p.row_a, "a"),
             **_event_cells(p.row_b, "b"),
         }
@@ -42,9 +48,14 @@ def usable_pair_events(pairs: Sequence[ExperimentPair]) -> pd.DataFrame:
         if p.is_usable
     ]
     names = [f"{name}_{side}" for side in "ab" for name in (*TIME_COLUMN_BY_EVENT, *TIME_SPAN_NAMES)]
-    frame = pd.DataFrame(rows, columns=["kind", "fault", *names])
+    frame = pd.DataFrame(rows, columns=["kind", "fault_id", *names])
     flags = [f"{name}_{side}" for side in "ab" for name in TIME_COLUMN_BY_EVENT]
-    return frame.astype(dict.fromkeys(flags, bool) | {n: float for n in names if n not in flags})
+    frame = frame.astype(dict.fromkeys(flags, bool) | {n: float for n in names if n not in flags})
+    if stratum_by_id is None:
+        return frame
+    strata = [stratum_by_id[p.row_a.experiment_id] for p in pairs if p.is_usable]
+    counts = Counter(strata)
+    return frame.assign(**{WEIGHT_COLUMN: [stratum[1] / counts[stratum] for stratum in strata]})
 
 
 def _event_cells(row: ResultRow, side: str) -> dict[str, object]:
@@ -84,6 +95,8 @@ def rates_sheets(frame: pd.DataFrame, names: RunDisplayNames) -> tuple[Sheet, Sh
         "fraction. Its interval resamples whole faults (variant and value); there is none if all faults "
         "agree. p: McNemar's exact test of the pairs that differ"
     )
+    if WEIGHT_COLUMN in frame:
+        note += ". Rates and differences are weighted, because the pairs are a sample; the counts are not"
     heads = (
         *("pairs", names.a, names.b, f"only {names.a}", f"only {names.b}"),
         *("difference", "difference, low", "difference, high", "p"),
@@ -93,10 +106,10 @@ def rates_sheets(frame: pd.DataFrame, names: RunDisplayNames) -> tuple[Sheet, Sh
 
 def _rate_cells(frame: pd.DataFrame, flag: str) -> tuple[SheetCell, ...]:
     first, second = frame[f"{flag}_a"], frame[f"{flag}_b"]
-    m, change = mcnemar_test(first, second), rate_difference(first, second, frame["fault"])
-    rates = (
-        share_with_interval(m.both + m.first_only, m.pair_count),
-        share_with_interval(m.both + m.second_only, m.pair_count),
+    weights = frame.get(WEIGHT_COLUMN)
+    m, change = mcnemar_test(first, second), rate_difference(first, second, frame["fault_id"], weights)
+    rates: tuple[SheetCell, ...] = tuple(
+        share_of_runs(frame, flags, flags | True) for flags in (first, second)
     )
     return (
         *(m.pair_count, *rates, m.first_only, m.second_only),

@@ -163,7 +163,7 @@ class Comparison:
     @cached_property
     def sheets(self) -> tuple[Sheet, ...]:
         """The tables, most important first."""
-        frame = usable_pair_events(self.pairs)
+        frame = usable_pair_events(self.pairs, self.a.stratum_by_id)
         rates, rates_by_type = rates_sheets(frame, self.names)
         spans, spans_by_type = times_sheets(frame, self.names)
         counts = (endings_cross_table(self.pairs, self.names), change_counts_sheet(self.pairs))

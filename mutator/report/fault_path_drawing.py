@@ -68,25 +68,27 @@ def counts_for_drawing(
     """Return what path_counts.js changes in the drawing to show other counts."""
     return {
         "active": counts.active_fault_count,
-        "links": {
-            name: _link_kind_width_count_and_interval(
-                counts.passed_by_link[name], counts.reached_by_link[name]
-            )
-            for name in links
-        },
+        "links": {name: _link_kind_width_count_and_interval(counts, name) for name in links},
         "components": {name: _box_classes_and_count_lines(name, counts) for name in structure.components},
     }
 
 
-def describe_passed_share(passed: int, reached: int) -> str:
-    """For example `12 of 40, 30 %`; '' if no fault reached the link."""
-    return f"{passed} of {reached}, {100 * passed / reached:.0f} %" if reached else ""
+def describe_passed_share(counts: PathCounts, link: str) -> str:
+    """For example `12 of 40, 30 %`, of a sample `12 of 40`; '' if no fault reached the link."""
+    passed, reached = counts.passed_by_link[link], counts.reached_by_link[link]
+    percent = "" if counts.is_sample or not reached else f", {100 * passed / reached:.0f} %"
+    return f"{passed} of {reached}{percent}" if reached else ""
 
 
-def describe_interval(passed: int, reached: int) -> str:
-    """Return the 95 % interval of the share; '' if no fault reached the link."""
+def describe_interval(counts: PathCounts, link: str) -> str:
+    """Return the 95 % interval of the share, or that there is none; '' if no fault reached the link."""
+    passed, reached = counts.passed_by_link[link], counts.reached_by_link[link]
+    if not reached:
+        return ""
+    if counts.is_sample:
+        return "of those drawn"
     result = share_with_interval(passed, reached)
-    return f"95 % interval {100 * result.low:.0f} to {100 * result.high:.0f} %" if reached else ""
+    return f"95 % interval {100 * result.low:.0f} to {100 * result.high:.0f} %"
 
 
 def _is_short(arrow: LinkArrow) -> bool:
@@ -102,9 +104,7 @@ def _idle_link_svg(arrow: LinkArrow, link: LinkModel) -> Iterator[str]:
 
 
 def _link_svg(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
-    kind, width, count, interval = _link_kind_width_count_and_interval(
-        counts.passed_by_link[name], counts.reached_by_link[name]
-    )
+    kind, width, count, interval = _link_kind_width_count_and_interval(counts, name)
     short = _is_short(arrow)
     first, _, last = count.partition(", ") if short else (count, "", "")
     yield (
@@ -120,11 +120,12 @@ def _link_svg(name: str, arrow: LinkArrow, link: LinkModel, counts: PathCounts) 
     )
 
 
-def _link_kind_width_count_and_interval(passed: int, reached: int) -> tuple[str, str, str, str]:
+def _link_kind_width_count_and_interval(counts: PathCounts, name: str) -> tuple[str, str, str, str]:
     """Return a link's kind, the width of its line, its count, and the interval of its share."""
+    passed, reached = counts.passed_by_link[name], counts.reached_by_link[name]
     kind = "through" if passed else "stopped" if reached else "quiet"
     width = _THINNEST_LINE_PX + (_WIDEST_LINE_PX - _THINNEST_LINE_PX) * (passed / reached if reached else 0.0)
-    count, interval = describe_passed_share(passed, reached), describe_interval(passed, reached)
+    count, interval = describe_passed_share(counts, name), describe_interval(counts, name)
     return kind, f"{width:.1f}px", count, interval
 
 

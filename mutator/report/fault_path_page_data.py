@@ -164,8 +164,10 @@ class PathCounts:
     """Counts over the paths of some faults. By link: how many reached its start, and how many passed it if
     its end is recorded. By component: how many came there by a link, were injected, stopped, and masked
     there. `masked_by_component_set` counts masked faults by the set of components that stopped them.
+    `is_sample`: the faults are a sample, so that counts of links have no rate of all.
     """
 
+    is_sample: bool = False
     active_fault_count: int = 0
     reached_by_link: Counter[str] = field(default_factory=Counter)
     passed_by_link: Counter[str] = field(default_factory=Counter)
@@ -197,12 +199,16 @@ class PathCounts:
 
 
 def path_counts_by_fault_type(
-    fault_types: "pd.Series[str]", untimed_path_indices: "np.ndarray", paths: RunFaultPaths
+    fault_types: "pd.Series[str]",
+    untimed_path_indices: "np.ndarray",
+    paths: RunFaultPaths,
+    *,
+    is_sample: bool = False,
 ) -> Mapping[str, PathCounts]:
     """Return counts of all faults, then by fault type. `untimed_path_indices`: the path of each row or -1."""
     import pandas as pd
 
-    counts: dict[str, PathCounts] = defaultdict(PathCounts)
+    counts: dict[str, PathCounts] = defaultdict(lambda: PathCounts(is_sample=is_sample))
     rows = pd.DataFrame({"kind": fault_types.to_numpy(), "untimed_path": untimed_path_indices})
     for kind, group in rows[rows["untimed_path"] >= 0].groupby("kind"):
         for code, count in group["untimed_path"].value_counts(sort=False).items():

@@ -79,14 +79,18 @@ def mcnemar_test(first: "pd.Series", second: "pd.Series") -> PairCounts:
     )
 
 
-def rate_difference(first: "pd.Series", second: "pd.Series", cluster: "pd.Series") -> PairedDifference:
+def rate_difference(
+    first: "pd.Series", second: "pd.Series", cluster: "pd.Series", weights: "pd.Series | None" = None
+) -> PairedDifference:
     """Return the difference of a flag's rates, second minus first, with its `resampled_interval` over
-    clusters.
+    clusters. `weights` says how often each pair counts; None: once.
     """
     change = second.astype(int) - first.astype(int)
-    sums = change.groupby(cluster.to_numpy()).agg(["sum", "count"])
-    low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _mean_change)
-    difference = float(change.mean()) if len(change) else math.nan
+    counts = change * 0 + 1 if weights is None else weights
+    sums = (change * counts).groupby(cluster.to_numpy()).sum().to_numpy()
+    totals = counts.groupby(cluster.to_numpy()).sum().to_numpy()
+    low, high = resampled_interval((sums, totals), _mean_change)
+    difference = float((change * counts).sum() / counts.sum()) if len(change) else math.nan
     return PairedDifference(difference=difference, low=low, high=high)
 
 

@@ -62,7 +62,7 @@ aria-label="Control structure">{{ drawing.figure }}</div>
 {% for name, (tail, tip, carries) in links.items() %}
 <tr data-link="{{ name }}"><td>{{ label(tail) }}</td><td>{{ label(tip) }}</td>
 <td>{{ carries }}</td>
-<td class="number">{{ share(counts[all].passed_by_link[name], counts[all].reached_by_link[name]) }}</td></tr>
+<td class="number">{{ share(counts[all], name) }}</td></tr>
 {% endfor %}
 </tbody></table></div></details>
 <h3>Where masked faults were stopped</h3>
@@ -84,7 +84,10 @@ def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
     paths = run.run_fault_paths
     counts = (
         path_counts_by_fault_type(
-            fault_types_of(run.results), run.experiment_facts.untimed_path_indices, paths
+            fault_types_of(run.results),
+            run.experiment_facts.untimed_path_indices,
+            paths,
+            is_sample=run.sampled_plan is not None,
         )
         if paths
         else {}
@@ -135,11 +138,11 @@ def _draw_path_counts(
     )
 
 
-def _describe_share_with_interval(passed: int, reached: int) -> str:
+def _describe_share_with_interval(counts: PathCounts, link: str) -> str:
     """`12 of 40, 30 %; 95 % interval 18 to 45 %`, as path_counts.js joins it."""
-    if not reached:
+    if not counts.reached_by_link[link]:
         return "none reached it"
-    return f"{describe_passed_share(passed, reached)}; {describe_interval(passed, reached)}"
+    return f"{describe_passed_share(counts, link)}; {describe_interval(counts, link)}"
 
 
 def _links_in_order(paths: RunFaultPaths) -> LinkPartsByName:
@@ -167,10 +170,10 @@ def _links_table(links: LinkPartsByName, counts: PathCounts, paths: RunFaultPath
             paths.component_label(tail),
             paths.component_label(tip),
             carries,
-            _describe_share_with_interval(counts.passed_by_link[name], came),
+            _describe_share_with_interval(counts, name),
         )
         for name, (tail, tip, carries) in links.items()
-        if (came := counts.reached_by_link[name])
+        if counts.reached_by_link[name]
     ]
     return TextTable(
         heads=("from", "to", "what it carries", "got through, of those that reached it"), rows=rows

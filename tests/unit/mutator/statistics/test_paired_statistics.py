@@ -115,3 +115,11 @@ def test_wilcoxon_is_exact_for_few_pairs(size: int) -> None:
     least = min(ranks[change > 0].sum(), ranks[change < 0].sum())
     expected = min(1.0, 2 * sum(total <= least for total in sums) / 2**size)
     assert paired_times(pd.Series(np.zeros(size)), change).p_value == pytest.approx(expected)
+
+
+def test_weighted_pairs_count_as_often_as_their_weights_say() -> None:
+    """Of four pairs, the second run of the first alone is worse; it stands for three, the others for one."""
+    first, second = pd.Series([False] * 4), pd.Series([True, False, False, False])
+    change = rate_difference(first, second, pd.Series(list("abcd")), pd.Series([3.0, 1.0, 1.0, 1.0]))
+    assert change.difference == 0.5
+    assert rate_difference(first, second, pd.Series(list("abcd"))).difference == 0.25
