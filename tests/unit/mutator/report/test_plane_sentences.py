@@ -122,7 +122,7 @@ def test_earlier_looks_are_shown() -> None:
     """What repairs followed on is not hidden by the last look."""
     text = describe_plane_validation(envelope_of(holes, FINE, validation=86))
     assert text.startswith("0 of 86 drawn cells hazardous: at most 4.9 % of the cells")
-    assert text.endswith(" 2 looks before found 1 and 1 hazardous cells, whose lines were then searched.")
+    assert text.endswith(" 1 look before found 1 hazardous cell, whose line was then searched.")
 
 
 CHALLENGED = replace(MADE_PLANE, challengers=("alternating_0.5s", "noise"))
