@@ -217,7 +217,7 @@ def test_a_search_names_what_it_found(toycar: Workspace, tmp_path: Path) -> None
     assert {row["scenario"] for row in rows} == {"A", "B"}
     run = mutator.load_run(tmp_path / "run", workspace=toycar)
     assert len(run.records) == 14 and run.verify().differences == ()
-    assert {f.result.experiment_id for f in run.findings} == {row["experiment"] for row in rows}
+    assert {f.result.experiment_id[:8] for f in run.findings} == {row["experiment"] for row in rows}
     assert run.envelopes == ()
 
 
