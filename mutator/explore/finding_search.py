@@ -71,6 +71,16 @@ class FindingSearch:
         if result.state is CellState.HAZARDOUS:
             self._hazardous.add(proposal.plane)
 
+    def finding_counts(self) -> list[int]:
+        """Return the number of findings after each run, in the order in which they were proposed."""
+        reached, counts = set[tuple[int, str]](), list[int]()
+        for proposal in self._proposed:
+            if (result := self.planes[proposal.plane].results.get(proposal.cell)) is not None:
+                if result.state is CellState.HAZARDOUS:
+                    reached.add((proposal.plane, result.hazard))
+                counts.append(len(reached))
+        return counts
+
     def findings(self) -> list[Finding]:
         """Return a finding for each plane and hazard, in the order of the planes."""
         return [

@@ -23,7 +23,7 @@ class SearchFindings:
 
     findings: Sequence[Finding]
     planes: Sequence[ExploredPlane]
-    run_count: int
+    counts: Sequence[int]  # of findings after each run
     note: str = ""
 
     @classmethod
@@ -35,7 +35,7 @@ class SearchFindings:
         return cls(
             findings=search.findings(),
             planes=search.section.planes,
-            run_count=sum(len(plane.results) for plane in search.planes),
+            counts=search.finding_counts(),
             note=replay.note,
         )
 
@@ -49,7 +49,7 @@ class SearchFindings:
         planes = len({finding.plane for finding in self.findings})
         return (
             f"The search has {counted(len(self.findings), 'finding')} in {planes} of "
-            f"{counted(len(self.planes), 'plane')}, from {counted(self.run_count, 'run')}."
+            f"{counted(len(self.planes), 'plane')}, from {counted(len(self.counts), 'run')}."
         )
 
     def table(self, *, with_links: bool) -> TextTable:

@@ -15,6 +15,8 @@ from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison_and_gates as comparing
 from mutator.comparison.comparison_replays import ReportAddresses
 from mutator.errors import MutatorError, NotServed
+from mutator.explore.envelope import Envelope
+from mutator.explore.exploration_replay import is_exploration, replay_exploration
 from mutator.outcomes.fault_free_runs import fault_free_alerts_note, load_fault_free_runs
 from mutator.report import report_builder
 from mutator.report.change_since_run_before import ChangeSinceRunBefore, find_change
@@ -110,12 +112,26 @@ class RunPages:
 
     def _build_comparison_files(self, a: Path, b: Path, addresses: ReportAddresses) -> dict[str, bytes]:
         notes = (self._golden_alerts_note(a), self._golden_alerts_note(b))
-        comparison = comparing.compare_runs(a, b, None, notes, (self._scene(a), self._scene(b)))
+        scenes, envelopes = (self._scene(a), self._scene(b)), (self._envelopes(a), self._envelopes(b))
+        comparison = comparing.compare_runs(a, b, None, notes, scenes, envelopes)
         return {
             "index.html": comparison_files.render_html_page(comparison, addresses).encode(),
             "pairs.csv": comparison_files.pairs_csv(comparison),
             "unmatched.csv": comparison_files.unmatched_csv(comparison),
         }
+
+    def _envelopes(self, run: Path) -> list[Envelope]:
+        """Return the envelopes of an exploration; none without a library that has its target."""
+        folder = RunFolder.open(run)
+        try:
+            if not is_exploration(folder):
+                return []
+            replay = replay_exploration(folder, self._workspace.manifest(folder.head.target))
+        except (MutatorError, KeyError):
+            return []
+        for difference in replay.differences:
+            raise difference
+        return replay.envelopes
 
     def _scene(self, run: Path) -> dict[str, Any] | None:
         try:

@@ -1,5 +1,8 @@
 """The panel of a search for hazardous faults: its findings."""
 
+from markupsafe import Markup
+
+from mutator.figures.finding_curve import draw_finding_curve
 from mutator.report.explored_planes import NO_PROBABILITY_NOTE
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
@@ -14,6 +17,8 @@ _HTML_TEMPLATE = """\
 <p class="quiet">{{ no_probability }}</p>
 {% if findings.findings %}
 {{ findings.table(with_links=True).as_html("plain") }}
+<figure>{{ curve }}<figcaption class="quiet">Distinct findings over runs. A search with
+<code>--strategy random</code> shows what chance finds.</figcaption></figure>
 <p class="quiet">{{ about | marked }}</p>
 {% endif %}
 """
@@ -29,6 +34,17 @@ def build_findings_panel(run: ReportedRun) -> Panel | None:
     if findings.findings:
         parts += [findings.table(with_links=False).as_markdown(), FINDINGS_NOTE]
     html = rendered(
-        _HTML_TEMPLATE, findings=findings, note=note, no_probability=NO_PROBABILITY_NOTE, about=FINDINGS_NOTE
+        _HTML_TEMPLATE,
+        findings=findings,
+        note=note,
+        no_probability=NO_PROBABILITY_NOTE,
+        about=FINDINGS_NOTE,
+        curve=Markup(draw_finding_curve(findings.counts)),
     )
-    return Panel(anchor="findings", link="Findings", markdown="\n\n".join(filter(None, parts)), html=html)
+    return Panel(
+        anchor="findings",
+        link="Findings",
+        markdown="\n\n".join(filter(None, parts)),
+        html=html,
+        style="report/envelopes.css",
+    )

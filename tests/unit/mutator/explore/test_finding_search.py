@@ -118,3 +118,11 @@ def test_paths_to_smaller_faults_end() -> None:
         plane.add(cell, CellResult(state=state, experiment_id="", hazard="H1"))
         count += 1
     assert count <= 16
+
+
+def test_findings_are_counted_after_each_run() -> None:
+    """The count never falls, has an entry for each run, and ends with all findings."""
+    search, batches = searched("planes")
+    counts = search.finding_counts()
+    assert len(counts) == sum(map(len, batches)) and counts == sorted(counts)
+    assert counts[-1] == len(search.findings()) > 0
