@@ -1,6 +1,7 @@
 """Builds mutants: turns a fault and a trigger into changed files, a patch and an id."""
 
-from collections.abc import Sequence
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -39,6 +40,8 @@ from mutator.mutants.splicing import (
 )
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import SourceTree
+
+_MOST_RECENT_FAULTS = 400  # with some 10 kB each
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,34 +87,38 @@ def build_without_reusing_changed_files(
 def _build_with_splicer(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, splicer: "_Splicer"
 ) -> Mutant:
-    injections = fault.injections if fault else ()
-    injection_edits = edits_of(manifest, models, injections)
-    ids = tuple(change.id for change in injection_edits)
     hold = fault.hold if fault and fault.hold else trigger.hold
     mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
-    edits = _edits_by_path(manifest, injection_edits)
+    common = splicer.change_files(manifest, models, fault)
     probe_file = probe_path(manifest.probe_package)
-    sets = any(injection.location.anchor.kind in LOAD_TIME_ANCHORS for injection in injections)
-    probe = _build_probe(manifest, models, mutant_id, trigger, hold, ids, sets)
+    probe = _build_probe(manifest, models, mutant_id, trigger, hold, common.ids, common.sets_on_load)
     text = probe.text
-    splicer.check_probe_compiles(text, (mutant_id, *ids), models.folder / PROBE_CODE)
-    files = {probe_file: text.encode()}
-    patches = {probe_file: render_new_file(probe_file, text)}
-    for path, file_edits in edits.items():
-        file = parsed_file(manifest.tree, path)
-        injection_edit = splicer.splice_and_compile(
-            file, [probe_import_edit(file, manifest.probe_package), *file_edits], ids
-        )
-        files[path], patches[path] = injection_edit.data, injection_edit.patch
+    splicer.check_probe_compiles(text, (mutant_id, *common.ids), models.folder / PROBE_CODE)
+    files, patches = {probe_file: text.encode()}, {probe_file: render_new_file(probe_file, text)}
+    for path, change in common.change_by_path.items():
+        files[path], patches[path] = change.data, change.patch
     return Mutant(
         id=mutant_id,
         files=dict(sorted(files.items())),
         patch="".join(text for _, text in sorted(patches.items())),
         tree_digest=manifest.tree.digest_with_changes(files),
         probe_source=probe,
-        injection_ids=ids,
-        ids_before_anchor=_ids_before_anchor(injection_edits),
+        injection_ids=common.ids,
+        ids_before_anchor=common.ids_before_anchor,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _FaultInFiles:
+    """What all mutants with a fault have in common: all but their probe, which has the trigger.
+
+    `sets_on_load`: whether the fault sets constants or defaults.
+    """
+
+    ids: tuple[str, ...]
+    ids_before_anchor: frozenset[str]
+    sets_on_load: bool
+    change_by_path: Mapping[str, ChangedFile]
 
 
 def _edits_by_path(
@@ -188,6 +195,24 @@ def _check_compiles(data: bytes, where: Path) -> None:
 class _Splicer:
     """Splices and compiles every file. `ids` are the ids in the injected lines."""
 
+    def change_files(
+        self, manifest: TargetManifest, models: FaultModels, fault: Fault | None
+    ) -> _FaultInFiles:
+        injections = fault.injections if fault else ()
+        injection_edits = edits_of(manifest, models, injections)
+        ids = tuple(change.id for change in injection_edits)
+        change_by_path = {}
+        for path, edits in _edits_by_path(manifest, injection_edits).items():
+            file = parsed_file(manifest.tree, path)
+            probe_import = probe_import_edit(file, manifest.probe_package)
+            change_by_path[path] = self.splice_and_compile(file, [probe_import, *edits], ids)
+        return _FaultInFiles(
+            ids=ids,
+            ids_before_anchor=_ids_before_anchor(injection_edits),
+            sets_on_load=any(i.location.anchor.kind in LOAD_TIME_ANCHORS for i in injections),
+            change_by_path=change_by_path,
+        )
+
     def check_probe_compiles(self, text: str, ids: Sequence[str], where: Path) -> None:
         _check_compiles(text.encode(), where)
 
@@ -210,11 +235,33 @@ class _Splicer:
         return ChangedFile(data=data, patch=render_changed_file(file.path, pieces))
 
 
+class _RecentFaults:
+    """The faults that were built last in a tree. Triggers take turns, so each fault comes again and again."""
+
+    def __init__(self, tree: SourceTree) -> None:
+        self.entries: OrderedDict[tuple[int, int, str], tuple[TargetManifest, FaultModels, _FaultInFiles]] = (
+            OrderedDict()
+        )
+
+
 class _ReusingSplicer(_Splicer):
     """Reuses a known change of a file if possible; otherwise splices the file and keeps the change."""
 
     def __init__(self, tree: SourceTree) -> None:
         self._tree = tree
+
+    def change_files(
+        self, manifest: TargetManifest, models: FaultModels, fault: Fault | None
+    ) -> _FaultInFiles:
+        recent = self._tree.derive_once_from_all(_RecentFaults)
+        key = (id(manifest), id(models), fault.id if fault else "")
+        if key not in recent.entries:
+            in_files = super().change_files(manifest, models, fault)
+            recent.entries[key] = (manifest, models, in_files)  # keeps both alive, and so their ids
+            if len(recent.entries) > _MOST_RECENT_FAULTS:
+                recent.entries.popitem(last=False)
+        recent.entries.move_to_end(key)
+        return recent.entries[key][2]
 
     def check_probe_compiles(self, text: str, ids: Sequence[str], where: Path) -> None:
         if not normalized_source_compiles(normalize_numbers_and_ids(text, ids).encode()):

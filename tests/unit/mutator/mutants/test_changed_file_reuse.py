@@ -1,13 +1,14 @@
 """Reusable changes give the same result as splicing, in files of every form."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Value
-from mutator.mutants import splicing
+from mutator.mutants import mutant_building, splicing
 from mutator.mutants.changed_file_reuse import (
     ChangedFile,
     ReusableChangedFile,
@@ -143,3 +144,17 @@ def test_a_reused_change_gives_the_same_errors(toy: Workspace, tmp_path: Path) -
         assert said[0] == said[1]
     with pytest.raises(InvalidMutant, match="does not compile"):
         build(manifest, models, fault(1), always_trigger())
+
+
+def test_a_fault_is_spliced_once_for_all_triggers(toy: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each mutant is what it is without reuse, also for a manifest of the same tree that forbids the file."""
+    manifest, models, stuck = toy.manifest("toy"), toy.fault_models(), fault(1.0)
+    spliced = []
+    edits_of = mutant_building.edits_of
+    monkeypatch.setattr(mutant_building, "edits_of", lambda *args: spliced.append(args) or edits_of(*args))
+    triggers = [replace(always_trigger(), condition=text) for text in ("t >= 1.0", "t >= 2.5", "t >= 1.0")]
+    mutants = [build(manifest, models, stuck, trigger) for trigger in triggers]
+    assert len(spliced) == 1
+    assert mutants == [build_without_reusing_changed_files(manifest, models, stuck, t) for t in triggers]
+    with pytest.raises(MutatorError, match="forbid"):
+        build(replace(manifest, forbidden_globs=(SENSOR,)), models, stuck, triggers[0])
