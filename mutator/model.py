@@ -346,6 +346,14 @@ class DefenceActivity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RunEnd:
+    """The last step of a run: its time in s and the car's speed in m/s; None without a speed."""
+
+    t: float
+    speed: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
     """The stored result of one experiment. Times are simulation times in s; None: no such event."""
 
@@ -390,3 +398,5 @@ class Record:
     #: what the defences in the tree did, in the order in which they act; only those that acted, and only if
     #: the run ended normally
     defences: tuple[DefenceActivity, ...] = added_field(())
+    #: the last step of a run in a tree with defences
+    run_end: RunEnd | None = added_field(None)

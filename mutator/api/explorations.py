@@ -26,6 +26,7 @@ from mutator.api.target_and_fault_selection import (
 )
 from mutator.campaigns.exploration_section import (
     CHALLENGER_KINDS,
+    DEFAULT_OBSERVE_S,
     STRATEGIES,
     ExplorationSection,
     ExploredPlane,
@@ -35,7 +36,7 @@ from mutator.execution.session_summary import Summary
 from mutator.explore.finding_search import Finding, dominated_share
 from mutator.store.run_progress import ProgressCallback
 
-DEFAULT_POINTS, DEFAULT_LONGEST_S, DEFAULT_OBSERVE_S = 51, 15.0, 15.0
+DEFAULT_POINTS, DEFAULT_LONGEST_S = 51, 15.0
 DEFAULT_CHALLENGERS: Sequence[str] = CHALLENGER_KINDS
 _ENVELOPE_PURPOSE = "How large and how long faults may be before a hazard follows."
 _SEARCH_PURPOSE = "Which faults cause hazards, and how small and how short they can be."

@@ -14,6 +14,7 @@ from mutator.api.run_experiments import RunExperiment
 from mutator.api.run_figures import RunFigures
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.audit.run_digests_and_seal import Seals, seals_of
+from mutator.campaigns.defended_runs import list_defended_runs
 from mutator.errors import MutatorError
 from mutator.execution.session_summary import Summary
 from mutator.exports import ExportSelection, Format, find_export
@@ -120,6 +121,14 @@ class Run(RunFigures):
     def seal(self) -> str | None:
         """The run's seal; None for a run that is unfinished."""
         return self.seals.seal
+
+    @property
+    def defended(self) -> dict[str, "Run"]:
+        """The runs with sets of defences, by the names of the sets; empty if the campaign has none."""
+        return {
+            path.name: Run(RunFolder.open(path), self.given_workspace)
+            for path in list_defended_runs(self.path)
+        }
 
     def counts(self) -> TextTable:
         """Count how the experiments of each fault type ended."""

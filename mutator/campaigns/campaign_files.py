@@ -17,7 +17,7 @@ from mutator.campaigns.campaign_triggers import (
     with_trigger_list_under_key,
 )
 from mutator.campaigns.expectations import Expectation
-from mutator.campaigns.exploration_section import ExplorationRequest, ExplorationSection
+from mutator.campaigns.exploration_section import DEFAULT_OBSERVE_S, ExplorationRequest, ExplorationSection
 from mutator.campaigns.installed_studies import CheckableStudy, load_installed_study
 from mutator.campaigns.operator_selection import MutantActivity, OperatorSelection
 from mutator.config.yaml_files import load_yaml_model
@@ -93,6 +93,7 @@ class Campaign:
     exploration: ExplorationSection | None = None  # what a bench explores; None if others decide
     exploration_request: ExplorationRequest | None = None  # what a campaign explores; None if it lists faults
     defence_sets: tuple[tuple[str, ...], ...] = ()  # names of defences; the run without any is not listed
+    observe_s: float = DEFAULT_OBSERVE_S  # of a drive after a fault whose hazard is prevented
 
     @property
     def seed(self) -> int:
@@ -210,6 +211,7 @@ def load_campaign(path: Path) -> Campaign:
         include=GoldenClass(model.include) if model.include else None,
         exploration_request=model.explore,
         defence_sets=_defence_sets(model, source),
+        observe_s=DEFAULT_OBSERVE_S if model.observe_s is None else model.observe_s,
     )
 
 

@@ -24,7 +24,7 @@ from mutator.campaigns.campaign_triggers import (
     to_value_by_reading,
 )
 from mutator.campaigns.expectations import Expectation
-from mutator.campaigns.exploration_section import ExplorationRequest
+from mutator.campaigns.exploration_section import DEFAULT_OBSERVE_S, ExplorationRequest
 from mutator.campaigns.operator_selection import MutantActivity
 from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.families.scenario_sampling import SAMPLING_METHODS
@@ -230,6 +230,13 @@ class CampaignModel(StrictModel, title="The file"):
         "the target's tree, in a run folder of its own, `defended/<set>`. An item is the name of a defence, "
         "a list of several, or `none`, the run without defences, which is there in any case.",
     )
+    observe_s: float | None = Field(
+        None,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="Only with `defences`: for how many seconds a drive must go on after its fault without a "
+        f"hazard, so that its hazard counts as prevented. Default: {DEFAULT_OBSERVE_S:g}.",
+    )
     canary: YamlRecord[Canary] | None = Field(
         None,
         description="A check that a known fault causes a hazard. Only a campaign that selects nothing but "
@@ -272,6 +279,8 @@ class CampaignModel(StrictModel, title="The file"):
             self._check_exploration()
         elif bool(self.faults) is not (self.triggers is not None):
             raise ValueError("`triggers`, because there are `faults`" if self.faults else "no `triggers`")
+        if self.observe_s is not None and not self.defences:
+            raise ValueError("`observe_s` only with `defences`")
         if not self.faults and self.canary is None:
             raise ValueError("a `canary`, without which nothing shows that a hazard can be reached")
         if self.canary is None and any(selection.operators is None for selection in self.faults):

@@ -9,6 +9,7 @@ from mutator.limits import MOST_LIMIT_OR_TIME
 
 ChallengerKind = Literal["alternating", "ramp", "noise", "glitch"]
 MOST_PLANES = 10_000
+DEFAULT_OBSERVE_S = 15.0  # how long a drive must go on after a fault that it survived
 STRATEGIES = ("planes", "random")
 MOST_SEEDS = 100
 _MOST_POINTS = 200
@@ -91,7 +92,7 @@ class ExplorationSection:
         default=300, metadata=yaml_metadata("Of `find`: the number of runs.", ge=1, le=1_000_000)
     )
     observe_s: float = field(
-        default=15.0,
+        default=DEFAULT_OBSERVE_S,
         metadata=yaml_metadata(
             "How long a drive must go on after a fault to count as without hazard, in s.",
             ge=0,
@@ -145,7 +146,7 @@ class ExplorationRequest:
         default=15.0, metadata=yaml_metadata("The longest duration, in s.", gt=0, le=MOST_LIMIT_OR_TIME)
     )
     observe_s: float = field(
-        default=15.0,
+        default=DEFAULT_OBSERVE_S,
         metadata=yaml_metadata(
             "How long a drive must go on after a fault to count as without hazard, in s.",
             ge=0,

@@ -26,6 +26,7 @@ from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe_contract import activation_of
 from mutator.outcomes import golden_trace_comparison, trace_and_record_loading
 from mutator.outcomes.actuator_change_and_speeds import (
+    end_of_run,
     first_actuator_change,
     share_in_direction,
     speeds_after_activation,
@@ -357,6 +358,7 @@ class ExperimentRunner:
             t_back=difference.t_back,
             ended_disengaged=not judged.is_engaged_at_end and is_engaged_at_end(self.manifest, reference),
             defences=load_defence_activities(self.manifest, execution.out),
+            run_end=end_of_run(self.manifest, faulty) if self.manifest.defences else None,
         )
 
     def _detail(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mutator.model import ObservedActivation
+from mutator.model import ObservedActivation, RunEnd
 from mutator.outcomes.golden_trace_comparison import (
     channel_deviation,
     signed_differences,
@@ -104,6 +104,15 @@ def speeds_after_activation(
             (GOLDEN_LOWEST_SPEED, float(golden_speeds.min())),
         ]
     return tuple(named)
+
+
+def end_of_run(manifest: TargetManifest, trace: Trace) -> RunEnd:
+    """Return the last step of a run."""
+    speed = math.nan
+    if manifest.speed:
+        values = formula_values_by_name(manifest, trace)
+        speed = float(trace_formulas.formula_at_each_step(manifest.speed, values)[-1])
+    return RunEnd(t=float(trace[manifest.time_channel][-1]), speed=speed if math.isfinite(speed) else None)
 
 
 def _speeds_between(manifest: TargetManifest, trace: Trace, first: float, last: float) -> np.ndarray:

@@ -1,6 +1,7 @@
 """What the defences in a run's tree did, as the run reports it. Nothing in the report is trusted."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,19 +22,28 @@ def load_defence_activities(manifest: TargetManifest, out: Path) -> tuple[Defenc
     """
     if not manifest.defences:
         return ()
+    commands = [command.name for command in manifest.actuation.commands] if manifest.actuation else []
+    return load_activities([*manifest.defences], commands, out)
+
+
+def load_activities(
+    defences: Sequence[str], commands: Sequence[str], out: Path
+) -> tuple[DefenceActivity, ...]:
+    """Return what each of these defences did that acted in the run whose output is in `out`. BadOutput if the
+    report is missing or damaged, or if one has changed another command than `commands`.
+    """
     path = path_below(out, DEFENCE_REPORT_FILE)
     try:
         report = parse_json(read_bounded(path, MOST_JSON_BYTES))
     except (OSError, ValueError):
         raise BadOutput("the run left no report of its defences", where=path) from None
-    commands = [command.name for command in manifest.actuation.commands] if manifest.actuation else []
-    if not isinstance(report, dict) or [*report] != [*manifest.defences]:
+    if not isinstance(report, dict) or [*report] != [*defences]:
         raise _damage_error(path)
     activities = (_activity(name, entry, commands, path) for name, entry in report.items())
     return tuple(activity for activity in activities if activity)
 
 
-def _activity(name: str, entry: Any, commands: list[str], path: Path) -> DefenceActivity | None:
+def _activity(name: str, entry: Any, commands: Sequence[str], path: Path) -> DefenceActivity | None:
     if not isinstance(entry, dict) or entry.keys() != _KEYS:
         raise _damage_error(path)
     counts = [entry[key] for key in _COUNTS]

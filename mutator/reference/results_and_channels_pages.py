@@ -4,6 +4,12 @@ from collections.abc import Iterable, Iterator
 
 from mutator._common.table_rendering import TextTable
 from mutator.reference.yaml_key_tables import generated_page_head
+from mutator.results.columns_of_defences import (
+    AUTHORITY_PREFIX,
+    COLUMNS_OF_EVERY_DEFENCE,
+    DEFENCE,
+    DRIVER_AT_END,
+)
 from mutator.results.columns_of_golden_hazards import golden_class_columns
 from mutator.results.csv_and_parquet_writers import ARROW_TYPE_BY_COLUMN_TYPE, TableColumn
 from mutator.results.plan_columns import plan_column_names
@@ -38,6 +44,10 @@ def render_results_page(workspace: Workspace) -> str:
             "A run with scenarios of [families](family.md) has the column `family`, and one for each "
             "parameter, with its key as name\n(`ego_kph`). They are empty for other scenarios. `scenario` "
             "is then the family and the beginning of a digest.\n",
+            f"A run with [defences](defence.md) has the columns from `{DEFENCE}` on, then "
+            f"`{AUTHORITY_PREFIX}<command>`, the value furthest from 0\nof each command that a defence "
+            f"gave, and the flag `{DRIVER_AT_END}`: whether a defence with the role `driver` acted in the "
+            "last\nstep.\n",
             *(line for manifest in manifests for line in _result_columns_section(manifest)),
             "## plan.csv\n",
             f"`plan.csv` has the columns that are known before a run: {left_out}.\n"
@@ -61,7 +71,15 @@ def _result_columns_section(manifest: TargetManifest) -> Iterator[str]:
     severity = severity_and_time_columns(has_classes=manifest.severity is not None)
     columns = (manifest.hazard_names, compared, metric_facts(manifest), severity)
     golden_classes = golden_class_columns((), several_seeds=False)
-    yield from _columns_table(result_columns(*columns, paths=True, speed=True, golden_classes=golden_classes))
+    yield from _columns_table(
+        result_columns(
+            *columns,
+            paths=True,
+            speed=True,
+            golden_classes=golden_classes,
+            defences=COLUMNS_OF_EVERY_DEFENCE,
+        )
+    )
 
 
 def _columns_table(columns: Iterable[TableColumn]) -> Iterator[str]:

@@ -107,7 +107,11 @@ def build_report(
     ) as wait_for_list_data:
         study = build_study_page(reported)
         content = _build_content(replace(reported, has_study_page=bool(study)), study, wait_for_list_data)
-    panels = (*content.on_one_page().panels, *(study.panels if study else ()))
+    panels = (
+        *content.leading_panels,
+        *content.on_one_page().panels,
+        *(study.panels if study else ()),
+    )
     files = {name: data for panel in panels for name, data in panel.files.items()}
     files |= {MARKDOWN_FILE: report_markdown(content).encode(), PAGE_FILE: report_html(content).encode()}
     files |= {page.file_name: page_html(content, page).encode() for page in content.all_pages}

@@ -22,7 +22,13 @@ from mutator.report.panel import REPORT_FOLDER
 from mutator.report.series_for_report_page import series_facts_for_page
 from mutator.store import file_digests
 from mutator.store import time_series_folder as series_store
-from mutator.store.allowed_contents import DAMAGED_FOLDER, SIGNATURE_FILES, TRACES_FOLDER, is_allowed_top_name
+from mutator.store.allowed_contents import (
+    DAMAGED_FOLDER,
+    DEFENDED_FOLDER,
+    SIGNATURE_FILES,
+    TRACES_FOLDER,
+    is_allowed_top_name,
+)
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_progress import PROGRESS_FILE
 from mutator.workspace import Workspace
@@ -127,6 +133,8 @@ def _input_file_digests(run: Path) -> Iterator[tuple[str, str]]:
         inside = sorted(top.rglob("*")) if top.is_dir() else [top]
         for path in (path for path in inside if not path.is_dir() and not path.name.startswith(".")):
             name = path.relative_to(run).as_posix()
+            if top.name == DEFENDED_FOLDER and _TOP_NAMES_NOT_READ.intersection(name.split("/")[2:3]):
+                continue
             yield name, "" if path.suffix in _SUFFIXES_WITHOUT_DIGEST else file_digests.sha256_of_file(path)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from mutator.errors import MutatorError
 from mutator.families.family_facts import FamilyFacts
 from mutator.outcomes.verdict_rules import reaction_time
+from mutator.results.columns_of_defences import COLUMNS_OF_EVERY_DEFENCE, defence_columns
 from mutator.results.columns_of_golden_hazards import AGAINST_GOLDEN, GOLDEN_CLASS, golden_class_columns
 from mutator.results.csv_and_parquet_writers import TableColumn
 from mutator.results.finished_experiments_and_columns import FinishedExperiment, ResultColumn, rounded_time
@@ -161,11 +162,13 @@ def result_columns(
     paths: bool = False,
     speed: bool = False,
     golden_classes: Sequence[ResultColumn] = (),
+    defences: Sequence[ResultColumn] = (),
 ) -> tuple[PlanColumn | ResultColumn, ...]:
     """Return the columns of results.csv, in order.
 
-    `severity` is from `severity_columns`, `golden_classes` from `golden_class_columns`. `families` are those
-    of the run's scenarios. `paths` adds the columns of the fault's path, `speed` those of the car's speed.
+    `severity` is from `severity_columns`, `golden_classes` from `golden_class_columns`, `defences` from
+    `defence_columns`. `families` are those of the run's scenarios. `paths` adds the columns of the fault's
+    path, `speed` those of the car's speed.
     """
     ends = DRIVE_END_COLUMN in (metric.name for metric in metrics)
     return (
@@ -188,6 +191,7 @@ def result_columns(
         *FIRST_CHANGE_COLUMNS,
         *(SPEED_COLUMNS if speed else ()),
         *golden_classes,
+        *defences,
         DETAIL_COLUMN,
     )
 
@@ -208,6 +212,7 @@ def result_columns_of(folder: RunFolder) -> tuple[PlanColumn | ResultColumn, ...
         golden_classes=golden_class_columns(golden_hazards, several_seeds=folder.has_seeded_goldens)
         if golden_hazards
         else (),
+        defences=defence_columns(head.defences),
     )
 
 
@@ -356,7 +361,9 @@ def check_parameter_names(manifest: TargetManifest, family: FamilyFacts) -> None
 def _names_besides_definitions(manifest: TargetManifest) -> set[str]:
     """Return the names of the columns that follow from no hazard, metric or family."""
     compared = [channel.name for channel in manifest.compared_channels]
-    columns = result_columns((), compared, paths=True, speed=bool(manifest.speed))
+    columns = result_columns(
+        (), compared, paths=True, speed=bool(manifest.speed), defences=COLUMNS_OF_EVERY_DEFENCE
+    )
     return {
         *(column.name for column in (*columns, *severity_and_time_columns(has_classes=True), FAMILY_COLUMN)),
         *DERIVED_COLUMN_NAMES,

@@ -15,6 +15,7 @@ from mutator.model import (
     ObservedActivation,
     Outcome,
     Record,
+    RunEnd,
     RunError,
     Status,
 )
@@ -29,9 +30,9 @@ LINE_SCHEMA_BY_FOLDER = {
     PROOF_FOLDER: RECORDS_SCHEMA,
 }
 _RECORD_FIELDS = tuple(field.name for field in fields(Record))
-_DATACLASS_FIELDS = ("activation", "error")  # fields that contain dataclasses
+_DATACLASS_FIELDS = ("activation", "error", "run_end")  # fields that contain dataclasses
 # left out while they have no value, as in most records
-_OMITTED_FIELDS = ("against_golden", "golden_hazards", "t_back", "ended_disengaged", "defences")
+_OMITTED_FIELDS = ("against_golden", "golden_hazards", "t_back", "ended_disengaged", "defences", "run_end")
 
 
 def record_as_json(record: Record) -> dict[str, Any]:
@@ -42,7 +43,7 @@ def record_as_json(record: Record) -> dict[str, Any]:
             del line[name]
     if record.defences:
         line["defences"] = [asdict(activity) for activity in record.defences]
-    return line | {name: asdict(line[name]) for name in _DATACLASS_FIELDS if line[name] is not None}
+    return line | {name: asdict(line[name]) for name in _DATACLASS_FIELDS if line.get(name) is not None}
 
 
 def record_from_json(data: Mapping[str, Any]) -> Record:
@@ -73,6 +74,7 @@ def record_from_json(data: Mapping[str, Any]) -> Record:
         t_back=data.get("t_back"),
         ended_disengaged=bool(data.get("ended_disengaged", False)),
         defences=tuple([_defence_activity(item) for item in data.get("defences", ())]),
+        run_end=RunEnd(**data["run_end"]) if data.get("run_end") else None,
     )
 
 

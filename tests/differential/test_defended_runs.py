@@ -1,5 +1,6 @@
 """Each set of defences has a run of its own, and the undefended run is as without them."""
 
+import csv
 import json
 import shutil
 from collections.abc import Callable
@@ -11,6 +12,8 @@ import mutator
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Outcome
+from mutator.report.report_builder import write_report
+from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -245,3 +248,37 @@ def test_a_cluster_gives_the_same_bytes(places: tuple[Workspace, Path], tmp_path
     run = mutator.run("defended", tmp_path / "run", cluster="local:2", reuse=False, workspace=places[0])
     assert run.summary and run.summary.exit_code == 0
     assert results_of_all(tmp_path / "run") == results_of_all(places[1])
+
+
+def test_the_report_begins_with_defences(places: tuple[Workspace, Path], tmp_path: Path) -> None:
+    """Its tables say what they prevented and cost, and list each pair."""
+    run = tmp_path / "run"
+    shutil.copytree(places[1], run)
+    report = write_report(run, places[0])
+    text = report.markdown.read_text()
+    assert text.index("## Defences") < text.index("## What is dangerous")
+    undefended = RunFolder.open(run).records()
+    defended = RunFolder.open(run / "defended" / SETS[1]).records()
+    hazardous = {name for name, record in undefended.items() if record.hazards}
+    acted = {name for name, record in defended.items() if record.defences}
+    tables = report.page.parent / "tables"
+    with (tables / "defences.csv").open() as file:
+        lines = {line["defences"]: line for line in csv.DictReader(file)}
+    assert [int(line["hazards"]) for line in lines.values()] == [len(hazardous)] * len(SETS)
+    assert int(lines[SETS[1]]["unneeded activations"]) == len(acted - hazardous)
+    with (tables / "defended_pairs.csv").open() as file:
+        listed = {line["experiment"] for line in csv.DictReader(file) if line["defences"] == SETS[1]}
+    assert listed == hazardous | acted
+    assert [*mutator.load_run(run).defended] == sorted(SETS)
+
+
+def test_a_defended_run_says_how_it_ended(places: tuple[Workspace, Path]) -> None:
+    """Only runs with defences have the columns on them."""
+    undefended, defended = (Results(path).frame() for path in (places[1], places[1] / "defended" / SETS[0]))
+    assert "defence" not in undefended
+    assert {"emergency_brake", ""} == set(defended["defence"])
+    braked = defended[defended["defence"] != ""]
+    assert (braked["defence_activations"] > 0).all() and (braked["t_defence"] > 0.0).all()
+    assert (braked["authority_brake"] == 1.0).all()
+    assert (braked["after_fault_s"] >= 0.0).all()
+    assert not defended["driver_at_end"].any()

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from mutator._common.extension_doors import STUDY_DOOR
 from mutator.report.panel import Panel, ReportPage
 from mutator.report.panels import (
+    defences_panel,
     envelopes_panel,
     failed_runs_panel,
     families_panel,
@@ -26,6 +27,7 @@ from mutator.report.reported_run import ReportedRun
 PanelBuilder = Callable[[ReportedRun], Panel | None]
 
 LEADING_PANELS: tuple[PanelBuilder, ...] = (  # before all others
+    defences_panel.build_defences_panel,
     envelopes_panel.build_envelopes_panel,
     findings_panel.build_findings_panel,
 )

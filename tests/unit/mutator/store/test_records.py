@@ -52,10 +52,11 @@ def test_a_line_equals_asdict(record: MakeRecord) -> None:
     for one in (record(), replace(record(), activation=activation), replace(record(), error=error)):
         expected = asdict(one)
         assert (expected.pop("against_golden"), expected.pop("golden_hazards")) == (None, ())
-        assert [expected.pop(name) for name in ("t_back", "ended_disengaged", "defences")] == [
+        assert [expected.pop(name) for name in ("t_back", "ended_disengaged", "defences", "run_end")] == [
             None,
             False,
             (),
+            None,
         ]
         assert canonical_json(record_as_json(one)) == canonical_json(expected)
 

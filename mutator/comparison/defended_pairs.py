@@ -1,0 +1,130 @@
+"""Pairs of one experiment without and with a set of defences, and what became of its hazard."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from mutator.model import Status
+from mutator.results.columns_of_defences import AFTER_FAULT, CONFLICTS, DEFENCE, DRIVER_AT_END, END_SPEED
+from mutator.results.result_rows import ResultRow
+
+STANDSTILL_MPS = 0.3  # below this, a car stands: as in openpilot, and in the hazards of the shipped target
+LEAST_DELTA_V_CHANGE_MPS = 0.1  # a smaller change of a contact is none
+
+
+class PairOutcome(StrEnum):
+    """What became of an experiment's hazard with defences."""
+
+    PREVENTED = "prevented"  # none until the end, and nothing that can still cause one
+    OPEN = "open"  # none until the end, but the drive ends too early to say more
+    REPLACED = "replaced"  # another hazard instead
+    MITIGATED = "mitigated"  # the same, less severe
+    UNCHANGED = "unchanged"  # the same, as severe
+    WORSENED = "worsened"  # the same, more severe, or one more hazard
+    CAUSED = "caused"  # a hazard that the undefended run does not have
+    NO_HAZARD = "no_hazard"  # in neither run
+    NOT_COMPARED = "not_compared"  # one of the runs crashed, or is no result
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DefendedRow:
+    """What a defended run adds to its row.
+
+    * `acted`: the defences that acted; `conflict_steps`: steps in which two disagreed
+    * `after_fault_s`: how long the drive went on after the fault; None if it was never active
+    * `end_speed`: in m/s, at the end of the drive; None if it is not known
+    * `driver_at_end`: whether a driver acted in the last step
+    * `authority`: by command, the value furthest from 0 that a defence commanded
+    """
+
+    acted: tuple[str, ...]
+    conflict_steps: int
+    after_fault_s: float | None
+    end_speed: float | None
+    driver_at_end: bool
+    authority: Mapping[str, float]
+
+    @classmethod
+    def of_cells(cls, cells: Mapping[str, Any], commands: Mapping[str, str]) -> "DefendedRow":
+        """Return what the cells of a row of results say. `commands` maps each column to its command."""
+        return cls(
+            acted=tuple(filter(None, (cells[DEFENCE] or "").split(";"))),
+            conflict_steps=int(cells[CONFLICTS] or 0),
+            after_fault_s=cells[AFTER_FAULT],
+            end_speed=cells[END_SPEED],
+            driver_at_end=bool(cells[DRIVER_AT_END]),
+            authority={
+                command: cells[column] for column, command in commands.items() if cells[column] is not None
+            },
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DefendedPair:
+    """An experiment without and with a set of defences."""
+
+    undefended: ResultRow
+    defended: ResultRow
+    facts: DefendedRow
+    outcome: PairOutcome
+
+    @property
+    def is_unneeded_activation(self) -> bool:
+        """Whether a defence acted although the undefended run has no hazard."""
+        return bool(self.facts.acted) and _is_complete(self.undefended) and not self.undefended.hazards
+
+
+def pair_of(undefended: ResultRow, defended: ResultRow, facts: DefendedRow, observe_s: float) -> DefendedPair:
+    """Return the pair of two rows of one experiment. `observe_s`: how long a drive must go on after its fault
+    for its hazard to count as prevented.
+    """
+    outcome = _outcome_of(undefended, defended, facts, observe_s)
+    return DefendedPair(undefended=undefended, defended=defended, facts=facts, outcome=outcome)
+
+
+def _outcome_of(
+    undefended: ResultRow, defended: ResultRow, facts: DefendedRow, observe_s: float
+) -> PairOutcome:
+    if not (_is_complete(undefended) and _is_complete(defended)):
+        return PairOutcome.NOT_COMPARED
+    before, after = ({name for name, _ in row.hazards} for row in (undefended, defended))
+    if not before:
+        return PairOutcome.CAUSED if after else PairOutcome.NO_HAZARD
+    if not after:
+        return PairOutcome.PREVENTED if _is_over(facts, observe_s) else PairOutcome.OPEN
+    if not before & after:
+        return PairOutcome.REPLACED
+    harm = _added_harm(undefended, defended) or len(after - before) or -len(before - after)
+    if not harm:
+        return PairOutcome.UNCHANGED
+    return PairOutcome.WORSENED if harm > 0 else PairOutcome.MITIGATED
+
+
+def _is_complete(row: ResultRow) -> bool:
+    return row.usable and row.status is Status.OK
+
+
+def _is_over(facts: DefendedRow, observe_s: float) -> bool:
+    """Whether nothing can follow: the fault is long over, the car stands, or a driver has it."""
+    if facts.driver_at_end or (facts.end_speed is not None and abs(facts.end_speed) < STANDSTILL_MPS):
+        return True
+    return facts.after_fault_s is not None and facts.after_fault_s >= observe_s
+
+
+def _added_harm(undefended: ResultRow, defended: ResultRow) -> float:
+    """Return a number above 0 if the defended run is more severe, below 0 if it is less severe: by severity
+    class, then by the change of speed in the contact.
+    """
+    if undefended.severity != defended.severity:
+        return 1.0 if undefended.severity < defended.severity else -1.0
+    if undefended.delta_v is None or defended.delta_v is None:
+        return 0.0
+    change = defended.delta_v - undefended.delta_v
+    return change if abs(change) >= LEAST_DELTA_V_CHANGE_MPS and math.isfinite(change) else 0.0
+
+
+def command_by_authority_column(columns: Sequence[str], prefix: str) -> dict[str, str]:
+    """Return the command of each column that begins with `prefix`."""
+    return {name: name.removeprefix(prefix) for name in columns if name.startswith(prefix)}

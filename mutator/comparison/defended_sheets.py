@@ -1,0 +1,254 @@
+"""The tables of sets of defences: what they did with each hazard, what it took, and what it cost."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+import pandas as pd
+
+from mutator.comparison.defended_pairs import DefendedPair, PairOutcome
+from mutator.comparison.defended_sets import DefendedSet
+from mutator.results.result_rows import ResultRow
+from mutator.statistics.paired_statistics import mcnemar_test, rate_difference, resampled_interval
+from mutator.statistics.shares_with_intervals import Share
+from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
+
+_HAZARD_OUTCOMES = (
+    PairOutcome.PREVENTED,
+    PairOutcome.OPEN,
+    PairOutcome.REPLACED,
+    PairOutcome.MITIGATED,
+    PairOutcome.UNCHANGED,
+    PairOutcome.WORSENED,
+)
+_NONE, _OPEN = "none", "open"  # columns of the matrix of hazards
+
+
+def defence_sheets(sets: Sequence[DefendedSet], hazards: Sequence[str]) -> tuple[Sheet, ...]:
+    """Return the tables of these sets, for the hazards of their target."""
+    return (
+        _outcomes_sheet(sets),
+        _hazards_sheet(sets, hazards),
+        _severity_sheet(sets),
+        _authority_sheet(sets),
+        _golden_sheet(sets),
+        _unneeded_sheet(sets),
+        _pairs_sheet(sets),
+    )
+
+
+def _outcomes_sheet(sets: Iterable[DefendedSet]) -> Sheet:
+    return Sheet(
+        name="defences",
+        title="What defences did with hazards",
+        note="Experiments with a hazard in the undefended run, by what became of it with each set; `caused` "
+        "are those that had none. The interval of the prevented share, and that of the difference of hazard "
+        "rates (with defences minus without), resample whole faults; there is none if all agree. p: "
+        "McNemar's exact test of the pairs that differ; `faults` is the number of faults behind them. A "
+        "sample's shares are those of its experiments, without weights.",
+        heads=(
+            *("defences", "hazards", "prevented", *(outcome.value for outcome in _HAZARD_OUTCOMES[1:])),
+            *("caused", "difference", "difference, low", "difference, high", "p", "faults"),
+            *("false activations", "unneeded activations", "with conflicts"),
+        ),
+        lines=tuple(_outcome_line(defended) for defended in sets),
+    )
+
+
+def _outcome_line(defended: DefendedSet) -> tuple[SheetCell, ...]:
+    counts = defended.count_by_outcome
+    hazards = sum(counts[outcome] for outcome in _HAZARD_OUTCOMES)
+    compared = [pair for pair in defended.pairs if pair.outcome is not PairOutcome.NOT_COMPARED]
+    before = pd.Series([bool(pair.undefended.hazards) for pair in compared], dtype=bool)
+    after = pd.Series([bool(pair.defended.hazards) for pair in compared], dtype=bool)
+    faults = pd.Series([pair.undefended.fault for pair in compared], dtype=object)
+    change = rate_difference(before, after, faults)
+    return (
+        defended.name,
+        hazards,
+        prevented_share(defended.pairs),
+        *(counts[outcome] for outcome in _HAZARD_OUTCOMES[1:]),
+        counts[PairOutcome.CAUSED],
+        *(change.difference, change.low, change.high),
+        PValue(mcnemar_test(before, after).p_value),
+        int(faults[before != after].nunique()),
+        sum(activity.is_false for activity in defended.golden_activities),
+        sum(pair.is_unneeded_activation for pair in defended.pairs),
+        sum(pair.facts.conflict_steps > 0 for pair in defended.pairs),
+    )
+
+
+def prevented_share(pairs: Iterable[DefendedPair]) -> Share:
+    """Return which share of the undefended hazards is prevented, with an interval that resamples faults."""
+    hazards, prevented = Counter[str](), Counter[str]()
+    for pair in pairs:
+        if pair.outcome in _HAZARD_OUTCOMES:
+            hazards[pair.undefended.fault] += 1
+            prevented[pair.undefended.fault] += pair.outcome is PairOutcome.PREVENTED
+    of, count = (np.array([counter[fault] for fault in hazards]) for counter in (hazards, prevented))
+    low, high = resampled_interval((count, of), _ratio) if len(of) else (math.nan, math.nan)
+    return Share(count=int(count.sum()), of=int(of.sum()), low=low, high=high)
+
+
+def _ratio(parts: np.ndarray, wholes: np.ndarray, axis: int = -1) -> np.ndarray:
+    return np.asarray(np.sum(parts, axis=axis) / np.sum(wholes, axis=axis))
+
+
+def _hazards_sheet(sets: Iterable[DefendedSet], hazards: Sequence[str]) -> Sheet:
+    lines: list[tuple[SheetCell, ...]] = []
+    for defended in sets:
+        counts = Counter(
+            (_first_hazard(pair.undefended) or _NONE, _end_with_defences(pair))
+            for pair in defended.pairs
+            if pair.outcome is not PairOutcome.NOT_COMPARED
+        )
+        lines += [
+            (defended.name, before, *(counts[before, after] for after in (_NONE, _OPEN, *hazards)))
+            for before in (*hazards, _NONE)
+            if any(counts[before, after] for after in (_NONE, _OPEN, *hazards))
+        ]
+    return Sheet(
+        name="defended_hazards",
+        title="Hazards without and with defences",
+        note="Numbers of experiments by their first hazard in the undefended run (rows) and with the set "
+        "(columns). `open`: no hazard, but the drive ends too early to say that it was prevented.",
+        heads=("defences", "undefended", _NONE, _OPEN, *hazards),
+        lines=tuple(lines),
+    )
+
+
+def _first_hazard(row: ResultRow) -> str:
+    return row.hazards[0][0] if row.hazards else ""
+
+
+def _end_with_defences(pair: DefendedPair) -> str:
+    return _OPEN if pair.outcome is PairOutcome.OPEN else _first_hazard(pair.defended) or _NONE
+
+
+def _severity_sheet(sets: Iterable[DefendedSet]) -> Sheet:
+    lines: list[tuple[SheetCell, ...]] = []
+    for defended in sets:
+        pairs = [pair for pair in defended.pairs if pair.outcome is not PairOutcome.NOT_COMPARED]
+        counts = Counter((pair.undefended.severity, pair.defended.severity) for pair in pairs)
+        for (before, after), count in sorted(counts.items()):
+            if before or after:
+                lines.append((defended.name, before or _NONE, after or _NONE, count))
+    return Sheet(
+        name="defended_severity",
+        title="Severity without and with defences",
+        note="Numbers of experiments by severity class; `none`: no hazard with a class.",
+        heads=("defences", "undefended", "with defences", "experiments"),
+        lines=tuple(lines),
+    )
+
+
+def _authority_sheet(sets: Iterable[DefendedSet]) -> Sheet:
+    lines: list[tuple[SheetCell, ...]] = []
+    for defended in sets:
+        commands = dict.fromkeys(name for pair in defended.pairs for name in pair.facts.authority)
+        for command in commands:
+            values = [
+                pair.facts.authority[command] for pair in defended.pairs if command in pair.facts.authority
+            ]
+            largest = max(values, key=abs)
+            lines.append((defended.name, command, len(values), float(np.median(values)), float(largest)))
+    return Sheet(
+        name="defence_authority",
+        title="Commands that defences needed",
+        note="Of the experiments in which the set gave this command: the value furthest from 0 in each, in "
+        "the command's unit.",
+        heads=("defences", "command", "experiments", "median", "largest"),
+        lines=tuple(lines),
+    )
+
+
+def _golden_sheet(sets: Iterable[DefendedSet]) -> Sheet:
+    return Sheet(
+        name="defences_without_faults",
+        title="Defences in fault-free drives",
+        note="What defences did without a fault. An activation is false if the undefended drive has no "
+        "hazard.",
+        heads=("defences", "drive", "defence", "first at (s)", "activations", "largest", "false", "hazards"),
+        lines=tuple(
+            (
+                defended.name,
+                activity.golden,
+                activity.activity.name,
+                activity.activity.first,
+                activity.activity.activations,
+                _largest_commands(activity.activity.commands),
+                "yes" if activity.is_false else "no",
+                ", ".join(activity.defended_hazards) or _NONE,
+            )
+            for defended in sets
+            for activity in defended.golden_activities
+        ),
+    )
+
+
+def _largest_commands(commands: Iterable[tuple[str, float, float]]) -> str:
+    return ", ".join(f"{name} {value:.3g}" for name, _, value in commands)
+
+
+def _unneeded_sheet(sets: Iterable[DefendedSet]) -> Sheet:
+    names = dict.fromkeys(
+        name
+        for defended in sets
+        for pair in defended.pairs
+        if pair.is_unneeded_activation
+        for name, _ in pair.undefended.margins
+    )
+    lines: list[tuple[SheetCell, ...]] = []
+    for defended in sets:
+        for pair in defended.pairs:
+            if pair.is_unneeded_activation:
+                margins = dict(pair.undefended.margins)
+                lines.append(
+                    (
+                        *(defended.name, pair.undefended.experiment_id, pair.undefended.fault),
+                        *(pair.undefended.scenario_label, ", ".join(pair.facts.acted)),
+                        *(margins.get(name) for name in names),
+                    )
+                )
+    return Sheet(
+        name="unneeded_activations",
+        title="Unneeded activations",
+        note="Defences that acted in experiments whose undefended run has no hazard, with the margins of "
+        "that run: small ones were close calls.",
+        heads=("defences", "experiment", "fault", "scenario", "acted", *(f"margin {name}" for name in names)),
+        lines=tuple(lines),
+    )
+
+
+def _pairs_sheet(sets: Iterable[DefendedSet]) -> Sheet:
+    return Sheet(
+        name="defended_pairs",
+        title="Experiments with defences",
+        note="Each experiment of which a defence acted or a hazard changed.",
+        heads=(
+            *("experiment", "fault", "scenario", "trigger", "undefended", "severity", "defences", "outcome"),
+            *("with defences", "severity with defences", "change of delta-v (m/s)", "acted"),
+        ),
+        lines=tuple(_pair_lines(sets)),
+    )
+
+
+def _pair_lines(sets: Iterable[DefendedSet]) -> Iterator[tuple[SheetCell, ...]]:
+    for defended in sets:
+        for pair in defended.pairs:
+            before, after = pair.undefended, pair.defended
+            if not (pair.facts.acted or before.hazards or after.hazards):
+                continue
+            both_touch = before.delta_v is not None and after.delta_v is not None
+            yield (
+                *(before.experiment_id, before.fault, before.scenario_label, before.trigger),
+                *(_hazard_text(before), before.severity or None, defended.name, pair.outcome.value),
+                *(_hazard_text(after), after.severity or None),
+                (after.delta_v or 0.0) - (before.delta_v or 0.0) if both_touch else None,
+                ", ".join(pair.facts.acted) or None,
+            )
+
+
+def _hazard_text(row: ResultRow) -> str:
+    return ", ".join(name for name, _ in row.hazards) or (_NONE if row.status == "ok" else row.ending)

@@ -1,0 +1,139 @@
+"""The panel of defences: what would have saved the worst, what it costs, and what it caused."""
+
+from collections.abc import Iterable, Sequence
+
+from mutator._common.message_text import counted
+from mutator._common.table_rendering import TextTable
+from mutator.comparison.defended_pairs import DefendedPair, PairOutcome
+from mutator.comparison.defended_sets import DefendedSet, load_defended_sets
+from mutator.comparison.defended_sheets import defence_sheets, prevented_share
+from mutator.report.panel import Panel, rendered
+from mutator.report.panels.tables_panel import sheet_csv_and_markdown_files
+from mutator.report.reported_run import ReportedRun
+from mutator.statistics.statistics_sheet import Sheet
+
+_MOST_CAUSED = 10  # pairs that the panel lists; the table has all
+_SHEETS_SHOWN = (
+    *("defences", "defended_hazards", "defended_severity", "defence_authority"),
+    "defences_without_faults",
+)
+_HTML_TEMPLATE = """\
+<h2>Defences</h2>
+{% for sentence in sentences %}
+<p>{{ sentence }}</p>
+{% endfor %}
+<ul>
+{% for name in names %}
+<li><a href="../defended/{{ name | urlencode }}/report/index.html">{{ name }}</a>: \
+the report of the run with these defences</li>
+{% endfor %}
+</ul>
+{% for sheet in sheets %}
+<details class="table"{{ " open" if loop.first }}>
+<summary><h3>{{ sheet.title }}</h3></summary>
+<p>{{ sheet.note | marked }}</p>
+{{ sheet.table().as_html("plain") }}
+</details>
+{% endfor %}
+"""
+
+
+def build_defences_panel(run: ReportedRun) -> Panel | None:
+    """Return the panel; None for a run without sets of defences that have results."""
+    sets = load_defended_sets(run.folder)
+    if not sets:
+        return None
+    sheets = defence_sheets(sets, run.folder.head.hazards)
+    unfolded = [sheet for sheet in sheets if sheet.name in _SHEETS_SHOWN and sheet.lines]
+    sentences = [*_sentences(sets)]
+    return Panel(
+        anchor="defences",
+        link="Defences",
+        markdown="\n\n".join(["## Defences", *sentences, *(_as_markdown(sheet) for sheet in unfolded)]),
+        html=rendered(
+            _HTML_TEMPLATE, sentences=sentences, names=[defended.name for defended in sets], sheets=unfolded
+        ),
+        summary=_summary(sets),
+        files=sheet_csv_and_markdown_files([sheet for sheet in sheets if sheet.lines]),
+    )
+
+
+def _as_markdown(sheet: Sheet) -> str:
+    return sheet.as_markdown().replace("## ", "### ", 1).rstrip()
+
+
+def _sentences(sets: Sequence[DefendedSet]) -> Iterable[str]:
+    """Say first what saves most of the worst, then what it costs, then what defences caused."""
+    severity = max(
+        (pair.undefended.severity for defended in sets for pair in _hazardous(defended)), default=""
+    )
+    worst = {
+        defended.name: [pair for pair in _hazardous(defended) if pair.undefended.severity == severity]
+        for defended in sets
+    }
+    what = f"hazards of severity {severity}" if severity else "hazards"
+    count_by_name = {
+        name: sum(pair.outcome is PairOutcome.PREVENTED for pair in pairs) for name, pairs in worst.items()
+    }
+    best = max(sets, key=lambda defended: count_by_name[defended.name])
+    of = len(worst[best.name])
+    if not of:
+        yield "No undefended run has a hazard, so there was nothing to prevent."
+    elif not count_by_name[best.name]:
+        yield f"No set prevents any of the {of} worst {what}."
+    else:
+        yield (
+            f"`{best.name}` prevents most of the worst: {count_by_name[best.name]} of {of} {what}, and "
+            f"{prevented_share(best.pairs)} of all hazards."
+        )
+        yield _cost_sentence(best)
+    for defended in sets:
+        if defended.caused_goldens:
+            runs = ", ".join(defended.caused_goldens)
+            yield f"`{defended.name}` causes a hazard without any fault: in {runs}."
+    yield _caused_sentence(sets)
+
+
+def _hazardous(defended: DefendedSet) -> list[DefendedPair]:
+    return [
+        pair
+        for pair in defended.pairs
+        if pair.undefended.hazards and pair.outcome is not PairOutcome.NOT_COMPARED
+    ]
+
+
+def _cost_sentence(defended: DefendedSet) -> str:
+    false = sum(activity.is_false for activity in defended.golden_activities)
+    unneeded = sum(pair.is_unneeded_activation for pair in defended.pairs)
+    without = sum(pair.outcome in (PairOutcome.NO_HAZARD, PairOutcome.CAUSED) for pair in defended.pairs)
+    return (
+        f"It also acts in {counted(false, 'fault-free drive')}, and in {unneeded} of "
+        f"{counted(without, 'experiment')} that had no hazard without it."
+    )
+
+
+def _caused_sentence(sets: Sequence[DefendedSet]) -> str:
+    caused = [(defended.name, pair) for defended in sets for pair in defended.select(PairOutcome.CAUSED)]
+    if not caused:
+        return "No set caused a hazard in an experiment that had none."
+    listed = "; ".join(
+        f"{pair.undefended.fault} in {pair.undefended.scenario_label} with `{name}` "
+        f"({', '.join(hazard for hazard, _ in pair.defended.hazards)}, `{pair.undefended.experiment_id}`)"
+        for name, pair in caused[:_MOST_CAUSED]
+    )
+    more = "" if len(caused) <= _MOST_CAUSED else "; all are in `tables/defended_pairs.csv`"
+    return f"Defences caused a hazard in {counted(len(caused), 'experiment')} that had none: {listed}{more}."
+
+
+def _summary(sets: Sequence[DefendedSet]) -> TextTable:
+    rows = [
+        [
+            defended.name,
+            str(len(_hazardous(defended))),
+            str(defended.count_by_outcome[PairOutcome.PREVENTED]),
+            str(defended.count_by_outcome[PairOutcome.OPEN]),
+            str(defended.count_by_outcome[PairOutcome.CAUSED]),
+        ]
+        for defended in sets
+    ]
+    return TextTable(heads=["defences", "hazards", "prevented", "open", "caused"], rows=rows)
