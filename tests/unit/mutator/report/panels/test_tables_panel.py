@@ -75,7 +75,8 @@ def test_tables_are_reproducible(run: RunFolder) -> None:
 
 def test_tables_of_alerts_mention_the_alerts_of_fault_free_runs(run: RunFolder) -> None:
     golden = run.path / "golden" / "S1"
-    drive = {name: np.ones(3000) for name in ("d_rel", "v_ego", "v_lead", "a_ego", "hwt", "long_state", "gas", "brake")}
+    channels = ("d_rel", "v_ego", "v_lead", "a_ego", "hwt", "long_state", "gas", "brake")
+    drive = {name: np.ones(3000) for name in channels}
     drive |= {"t": np.arange(3000) / 100, "lateral_offset": np.linspace(-0.25, 0.5, 3000)}
     np.savez(golden / "trace.npz", **drive)
     record = {"hazards": {"H1": None}, "alerts": [{"name": "steer_saturated", "t": 12.29}]}
