@@ -9,7 +9,7 @@ import pytest
 
 from mutator.campaigns.plan import build_plan
 from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.paper.observations_panel import build_observations_panel
+from mutator.paper.observations_panel import _differences_from_papers_mixture, build_observations_panel
 from mutator.paper.published_numbers import load_published_numbers
 from mutator.report.reported_run import ReportedRun
 from mutator.store.plan_choices import Choices
@@ -80,3 +80,18 @@ def test_a_report_without_activated_faults_of_the_paper_has_no_observations(
         experiment_facts=SEEN,
     )
     assert build_observations_panel(run) is None
+
+
+def test_claims_about_all_faults_are_not_decided_by_an_even_sample(toycar: Workspace, tmp_path: Path) -> None:
+    shutil.copytree(REFERENCES, toycar.library / "references")
+    folder = freeze_plan(build_plan(toycar, "small", Choices(limit=2)), tmp_path / "run", toycar)
+    frame = results({"module": "radar", "fault_type": "chaff", "fault_id": "f", "seed": 1}).assign(weight=2.0)
+    run = ReportedRun(
+        folder=folder,
+        workspace=toycar,
+        results=pd.DataFrame({"status": ["ok"] * folder.head.experiments}),
+        frame=frame,
+        published_work=None,
+        experiment_facts=SEEN,
+    )
+    assert "the experiments are an even sample" in list(_differences_from_papers_mixture(run, []))

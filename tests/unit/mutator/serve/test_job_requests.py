@@ -148,6 +148,8 @@ def test_requests_become_command_lines(desk: RequestChecker) -> None:
     words = work(desk, **CAMPAIGN, only="scenario == 'A'", workers=1).argv
     options = (f"--out={run.parent}/new", "--limit=20", "--only=scenario == 'A'", "--workers=1")
     assert words == ("run", "small", *options, *place)
+    words = work(desk, **CAMPAIGN, proportional=True, workers=1).argv
+    assert words == ("run", "small", options[0], options[1], options[3], "--proportional", *place)
 
 
 def test_a_value_outside_of_the_declared_range_is_refused_in_words(desk: RequestChecker) -> None:
@@ -206,7 +208,8 @@ def test_a_campaign_that_explores_runs_whole(desk: RequestChecker) -> None:
     explored = f"{text}faults: [{{spec: sensor/lane/shifted}}]\nexplore: {{starts: [1]}}\nseed: 3\n{canary}\n"
     (desk.workspace.library / "campaigns/explored.yaml").write_text(explored)
     order = {"kind": "campaign", "campaign": "explored", "name": "new"}
-    words = work(desk, **order, workers=1).argv
+    words = work(desk, **order, workers=1, proportional=True).argv
+    assert "--proportional" not in words
     assert words[:4] == ("run", "explored", f"--out={desk.runs.folder('first').parent}/new", "--workers=1")
     with pytest.raises(MutatorError, match="a filter for explored, which explores"):
         work(desk, **order, only="scenario == 'A'")
