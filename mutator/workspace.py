@@ -31,7 +31,6 @@ from mutator.faults.fault_specs import FaultSpec, load_spec
 from mutator.faults.library_readings import SpecReadings, load_readings
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import ConcreteScenario, Fault
-from mutator.mutants.defended_target import defended_manifest
 from mutator.results.table_columns import check_column_names
 from mutator.store.planned_scenarios import PlannedScenarios, planned_scenarios_of
 from mutator.store.run_head import RunHead
@@ -138,7 +137,13 @@ class Workspace:
 
     def defended(self, manifest: TargetManifest, names: Iterable[str]) -> TargetManifest:
         """Return the target with these defences of the library in its tree."""
-        return defended_manifest(manifest, [self.defence(name) for name in names], self.templates)
+        defences = [self.defence(name) for name in names]
+        if not defences:
+            return manifest
+        # every verb loads this module, and only this function parses Python
+        from mutator.mutants.defended_target import defended_manifest
+
+        return defended_manifest(manifest, defences, self.templates)
 
     def manifest_of(self, head: RunHead) -> TargetManifest:
         """Return the target of a run folder, with the defences in the tree that it ran."""

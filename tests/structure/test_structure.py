@@ -19,14 +19,15 @@ from mutator.cli.shared_options import WorkspaceOptions
 
 CLONE = Path(__file__).parents[2]
 TOP_MODULES = 12
-# may import the harness inside functions, to load only what a command needs
-# doors load what a call needs, and a finished run no pytest; elsewhere, imports are at the top
+# may import the harness inside functions, to load only what a command or call needs: a finished run needs
+# no pytest, a list no parser of Python
 LAZY = (
     "mutator/__init__.py",
     "mutator/api/",
     "mutator/cli/",
     "mutator/execution/local_distributor.py",
     "mutator/execution/pytest_plugin.py",
+    "mutator/workspace.py",
 )
 
 
