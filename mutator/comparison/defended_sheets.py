@@ -29,6 +29,7 @@ def defence_sheets(sets: Sequence[DefendedSet], hazards: Sequence[str]) -> tuple
     """Return the tables of these sets, for the hazards of their target."""
     return (
         _outcomes_sheet(sets),
+        _rates_sheet(sets),
         _hazards_sheet(sets, hazards),
         _severity_sheet(sets),
         _authority_sheet(sets),
@@ -43,14 +44,11 @@ def _outcomes_sheet(sets: Iterable[DefendedSet]) -> Sheet:
         name="defences",
         title="What defences did with hazards",
         note="Experiments with a hazard in the undefended run, by what became of it with each set; `caused` "
-        "are those that had none. The interval of the prevented share, and that of the difference of hazard "
-        "rates (with defences minus without), resample whole faults; there is none if all agree. p: "
-        "McNemar's exact test of the pairs that differ; `faults` is the number of faults behind them. A "
-        "sample's shares are those of its experiments, without weights.",
+        "are those that had none. The interval of the prevented share resamples whole faults; there is none "
+        "if all agree. A sample's shares are those of its experiments, without weights.",
         heads=(
             *("defences", "hazards", "prevented", *(outcome.value for outcome in _HAZARD_OUTCOMES[1:])),
-            *("caused", "difference", "difference, low", "difference, high", "p", "faults"),
-            *("false activations", "unneeded activations", "with conflicts"),
+            *("caused", "false activations", "unneeded activations", "with conflicts"),
         ),
         lines=tuple(_outcome_line(defended) for defended in sets),
     )
@@ -58,24 +56,46 @@ def _outcomes_sheet(sets: Iterable[DefendedSet]) -> Sheet:
 
 def _outcome_line(defended: DefendedSet) -> tuple[SheetCell, ...]:
     counts = defended.count_by_outcome
-    hazards = sum(counts[outcome] for outcome in _HAZARD_OUTCOMES)
+    return (
+        defended.name,
+        sum(counts[outcome] for outcome in _HAZARD_OUTCOMES),
+        prevented_share(defended.pairs),
+        *(counts[outcome] for outcome in _HAZARD_OUTCOMES[1:]),
+        counts[PairOutcome.CAUSED],
+        sum(activity.is_false for activity in defended.golden_activities),
+        sum(pair.is_unneeded_activation for pair in defended.pairs),
+        sum(pair.facts.conflict_steps > 0 for pair in defended.pairs),
+    )
+
+
+def _rates_sheet(sets: Iterable[DefendedSet]) -> Sheet:
+    return Sheet(
+        name="defence_rates",
+        title="Hazards with and without defences, in pairs",
+        note="Experiments that have a result without and with the set, and how many have a hazard. "
+        "Difference: the share with defences minus that without; its interval resamples whole faults. p: "
+        "McNemar's exact test of the pairs that differ; `faults` is the number of faults behind them, which "
+        "are fewer than the pairs that the test takes for independent.",
+        heads=(
+            *("defences", "pairs", "without", "with", "difference", "difference, low", "difference, high"),
+            *("p", "pairs that differ", "faults"),
+        ),
+        lines=tuple(_rate_line(defended) for defended in sets),
+    )
+
+
+def _rate_line(defended: DefendedSet) -> tuple[SheetCell, ...]:
     compared = [pair for pair in defended.pairs if pair.outcome is not PairOutcome.NOT_COMPARED]
     before = pd.Series([bool(pair.undefended.hazards) for pair in compared], dtype=bool)
     after = pd.Series([bool(pair.defended.hazards) for pair in compared], dtype=bool)
     faults = pd.Series([pair.undefended.fault for pair in compared], dtype=object)
     change = rate_difference(before, after, faults)
     return (
-        defended.name,
-        hazards,
-        prevented_share(defended.pairs),
-        *(counts[outcome] for outcome in _HAZARD_OUTCOMES[1:]),
-        counts[PairOutcome.CAUSED],
+        *(defended.name, len(compared), int(before.sum()), int(after.sum())),
         *(change.difference, change.low, change.high),
         PValue(mcnemar_test(before, after).p_value),
+        int((before != after).sum()),
         int(faults[before != after].nunique()),
-        sum(activity.is_false for activity in defended.golden_activities),
-        sum(pair.is_unneeded_activation for pair in defended.pairs),
-        sum(pair.facts.conflict_steps > 0 for pair in defended.pairs),
     )
 
 

@@ -15,7 +15,6 @@ from markupsafe import Markup
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import as_json_types
 from mutator.config.location_syntax import location_as_yaml
-from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.patches_by_file import patch_without_new_files
 from mutator.report.answer_parts import warning_filter_values
@@ -25,7 +24,7 @@ from mutator.report.first_screen_facts import worst_record
 from mutator.report.heat_map_data import build_heat_map
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.report_glossary import code_meanings_by_column
-from mutator.report.reported_run import ReportedRun
+from mutator.report.reported_run import ReportedRun, manifest_if_any
 from mutator.report.series_for_report_page import series_facts_for_page
 from mutator.report.source_lines_with_outcomes import SourceLines
 from mutator.results.experiment_sentence import ExperimentSentences
@@ -141,10 +140,7 @@ def _describe_truncation(run: ReportedRun) -> str:
 
 def _film_and_scene_facts(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
     """Whether films can be made (true without a manifest), and the scene for the replay."""
-    try:
-        manifest = workspace.manifest_of(folder.head) if workspace else None
-    except MutatorError:
-        manifest = None
+    manifest = manifest_if_any(folder, workspace)
     filmed = manifest is None or manifest.film is not None
     return {"filmed": filmed, "scene": scene_as_json(manifest) if manifest else None}
 

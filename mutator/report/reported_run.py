@@ -26,6 +26,7 @@ from mutator.statistics.sample_weights import SampledPlan, sampled_plan, with_we
 from mutator.store import plan_file
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -161,5 +162,13 @@ def _find_published_work(folder: RunFolder) -> PublishedWork | None:
     name = folder.head.study
     try:
         return cast(PublishedWork, load_installed_study(name)) if name else None
+    except MutatorError:
+        return None
+
+
+def manifest_if_any(folder: RunFolder, workspace: Workspace | None) -> TargetManifest | None:
+    """Return the manifest of a run's target; None without a library that has it."""
+    try:
+        return workspace.manifest_of(folder.head) if workspace else None
     except MutatorError:
         return None

@@ -196,6 +196,7 @@ class TimeSeriesFolder:
 def run_facts_for_series(record: Record) -> dict[str, Any]:
     """Return what a faulty series says about its run: the digest of its trace, and its events."""
     active = record.activation
+    defences = [[activity.name, activity.first] for activity in record.defences]
     return {
         "trace": record.trace_digest,
         "active": [active.first, active.last] if active else None,
@@ -203,6 +204,7 @@ def run_facts_for_series(record: Record) -> dict[str, Any]:
         "alerts": [list(event) for event in record.alerts],
         "hazards": [list(event) for event in record.hazards],
         "t_end": record.t_end,
+        **({"defences": defences} if defences else {}),
     }
 
 

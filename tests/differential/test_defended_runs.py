@@ -270,6 +270,9 @@ def test_the_report_begins_with_defences(places: tuple[Workspace, Path], tmp_pat
         listed = {line["experiment"] for line in csv.DictReader(file) if line["defences"] == SETS[1]}
     assert listed == hazardous | acted
     assert [*mutator.load_run(run).defended] == sorted(SETS)
+    page = (report.page.parent / "defended" / SETS[1] / "index.html").read_text()
+    changed = {name for name in hazardous if undefended[name].hazards != defended[name].hazards}
+    assert changed and all(f'data-a="{name}"' in page for name in changed)
 
 
 def test_a_defended_run_says_how_it_ended(places: tuple[Workspace, Path]) -> None:

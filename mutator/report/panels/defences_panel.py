@@ -1,20 +1,26 @@
 """The panel of defences: what would have saved the worst, what it costs, and what it caused."""
 
 from collections.abc import Iterable, Sequence
+from urllib.parse import quote
 
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
+from mutator.comparison.comparison_files import pairs_csv, render_html_page, unmatched_csv
+from mutator.comparison.comparison_replays import ReportAddresses
 from mutator.comparison.defended_pairs import DefendedPair, PairOutcome
 from mutator.comparison.defended_sets import DefendedSet, load_defended_sets
 from mutator.comparison.defended_sheets import defence_sheets, prevented_share
-from mutator.report.panel import Panel, rendered
+from mutator.comparison.run_comparison_and_gates import compare_runs
+from mutator.report.panel import REPORT_FOLDER, Panel, rendered
 from mutator.report.panels.tables_panel import sheet_csv_and_markdown_files
-from mutator.report.reported_run import ReportedRun
+from mutator.report.reported_run import ReportedRun, manifest_if_any
 from mutator.statistics.statistics_sheet import Sheet
+from mutator.store.allowed_contents import DEFENDED_FOLDER
+from mutator.targets.overhead_view_json import scene_as_json
 
 _MOST_CAUSED = 10  # pairs that the panel lists; the table has all
 _SHEETS_SHOWN = (
-    *("defences", "defended_hazards", "defended_severity", "defence_authority"),
+    *("defences", "defence_rates", "defended_hazards", "defended_severity", "defence_authority"),
     "defences_without_faults",
 )
 _HTML_TEMPLATE = """\
@@ -24,8 +30,7 @@ _HTML_TEMPLATE = """\
 {% endfor %}
 <ul>
 {% for name in names %}
-<li><a href="../defended/{{ name | urlencode }}/report/index.html">{{ name }}</a>: \
-the report of the run with these defences</li>
+<li><a href="{{ page_name(name) | urlencode }}">{{ name }}</a>: each drive beside the undefended one</li>
 {% endfor %}
 </ul>
 {% for sheet in sheets %}
@@ -51,11 +56,36 @@ def build_defences_panel(run: ReportedRun) -> Panel | None:
         link="Defences",
         markdown="\n\n".join(["## Defences", *sentences, *(_as_markdown(sheet) for sheet in unfolded)]),
         html=rendered(
-            _HTML_TEMPLATE, sentences=sentences, names=[defended.name for defended in sets], sheets=unfolded
+            _HTML_TEMPLATE,
+            sentences=sentences,
+            names=[defended.name for defended in sets],
+            sheets=unfolded,
+            page_name=_page_name,
         ),
         summary=_summary(sets),
-        files=sheet_csv_and_markdown_files([sheet for sheet in sheets if sheet.lines]),
+        files=sheet_csv_and_markdown_files([sheet for sheet in sheets if sheet.lines])
+        | {name: data for defended in sets for name, data in _files_of_pairs(run, defended).items()},
     )
+
+
+def _page_name(set_name: str) -> str:
+    return f"{DEFENDED_FOLDER}/{set_name}/index.html"
+
+
+def _files_of_pairs(run: ReportedRun, defended: DefendedSet) -> dict[str, bytes]:
+    """Return the comparison of the undefended run with that of a set, drive by drive."""
+    manifest = manifest_if_any(run.folder, run.workspace)
+    scene = scene_as_json(manifest) if manifest else None
+    comparison = compare_runs(run.folder.path, defended.folder.path, scenes=(scene, scene))
+    report = defended.folder.path / REPORT_FOLDER / "index.html"
+    of_set = f"../../../{DEFENDED_FOLDER}/{quote(defended.name)}/{REPORT_FOLDER}/index.html"
+    addresses = ReportAddresses(a="../../index.html", b=of_set if report.is_file() else "")
+    folder = f"{DEFENDED_FOLDER}/{defended.name}"
+    return {
+        _page_name(defended.name): render_html_page(comparison, addresses).encode(),
+        f"{folder}/pairs.csv": pairs_csv(comparison),
+        f"{folder}/unmatched.csv": unmatched_csv(comparison),
+    }
 
 
 def _as_markdown(sheet: Sheet) -> str:

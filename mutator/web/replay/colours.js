@@ -17,7 +17,7 @@ const ReplayColours = (() => {
     const names = ["golden", "faulty", "hazard", "ink", "quiet", "line", "raised", "road", "verge", "post", "paint", "other", "glass", "edge", "halo", "burst",
       "active", "after", "late", "between", "belief", "beside"];
     const colours = Object.fromEntries(names.map((name) => [name, of(`replay-${name}`) || of(name)]));
-    return Object.assign(colours, { ground: of("raised"), alert: of("sdc"), manifest: of("masked"), activation: of("ink"), goldenText: of("accent") });
+    return Object.assign(colours, { ground: of("raised"), alert: of("sdc"), manifest: of("masked"), defence: of("accent"), activation: of("ink"), goldenText: of("accent") });
   }
 
   /** Resize a canvas to this size in CSS pixels, and return its cleared context. */

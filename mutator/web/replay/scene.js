@@ -3,7 +3,7 @@
 // A scene from above on a canvas: the faulty run solid, the golden run as an outline, events marked on the ground.
 
 class ReplayScene {
-  static SYMBOLS = { activation: "▲", manifest: "◆", alert: "!", hazard: "✕" };
+  static SYMBOLS = { activation: "▲", manifest: "◆", alert: "!", defence: "■", hazard: "✕" };
   static DASH = [3, 9]; // length (m) of dash and gap of a line
   static POST = 20; // distance (m) of the posts that make motion visible
   static AT = 0.24; // position of the followed actor, as a share of the width

@@ -159,8 +159,9 @@ const SeriesFile = (() => {
     return joined;
   }
 
-  function marks({ active, manifest, alerts, hazards }) {
+  function marks({ active, manifest, alerts, hazards, defences = [] }) {
     const eventMarks = [...alerts.map(([name, t]) => ["alert", t, name]), ...hazards.map(([name, t]) => ["hazard", t, name])];
+    for (const [name, t] of defences) eventMarks.push(["defence", t, `${name} acts`]);
     if (active) eventMarks.push(["activation", active[0], "activated"]);
     if (manifest !== null) eventMarks.push(["manifest", manifest, "manifested"]);
     return eventMarks.sort((a, b) => a[1] - b[1]);
