@@ -202,8 +202,8 @@ def search(
 ) -> "Findings":
     """Search hazardous faults among all variants, scenarios and starts together, with `budget` runs.
 
-    * `strategy`: `planes` begins with the largest and longest faults, learns which lead to hazards, and goes
-      on to smaller and shorter ones; `random` draws faults, to compare.
+    * `strategy`: `planes` learns which faults lead to hazards, and drives what promises most, new faults or
+      smaller and shorter ones; `random` draws faults, to compare.
     * The other arguments are as for `envelope`. Each plane has 16 magnitudes and 9 durations.
 
     The run folder `out` is that of a bench. Errors are as for `envelope`.

@@ -225,8 +225,8 @@ def search(
 ) -> None:
     """Search small and short faults that cause hazards, among many faults, scenarios and starts.
 
-    The search begins with the largest and longest faults, learns which lead to hazards, and makes these
-    smaller and shorter. It finds bounds: a smaller fault that it did not try can cause the same hazard.
+    The search learns which faults lead to hazards, and drives what promises most: new faults, or smaller and
+    shorter ones. It finds bounds: a smaller fault that it did not try can cause the same hazard.
     """
     from mutator.api.explorations import search as find_hazards
     from mutator.cli.progress_display import campaign_progress

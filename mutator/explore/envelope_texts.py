@@ -142,7 +142,7 @@ def _finding_row(finding: Finding, plane: ExploredPlane) -> list[str]:
         plane.start,
         finding.hazard,
         magnitude,
-        f"{plane.durations_s[duration]:g} s",
+        f"{plane.durations_s[duration]:g} s{' (inferred)' if finding.is_inferred else ''}",
         f"{finding.result.time_to_hazard_s:.2f} s",
         finding.result.experiment_id[:8],
     ]

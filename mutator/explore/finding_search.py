@@ -1,37 +1,40 @@
 """Searches all planes together for hazardous faults that are small and short.
 
-The strategy `planes` goes on in breadth, to the largest and longest fault of a plane that was not driven yet,
-and in depth, towards smaller and shorter faults of a plane with a hazard. It is a function of the results.
+The strategy `planes` drives the cell with the largest expected gain: the chance of a hazard, as planes of the
+same fault, scenario and start let expect it, times what the hazard would add, a first finding and the share
+of the plane's cells that are as large and long. It is a function of the results.
 """
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from math import prod
+
+import numpy as np
 
 from mutator._common.random_streams import random_generator
-from mutator.campaigns.exploration_section import ExplorationSection
+from mutator.campaigns.exploration_section import ExplorationSection, ExploredPlane
 from mutator.explore.cell_results import CellResult, CellState, Drive, judge_cell
 from mutator.explore.exploration import Proposal
+from mutator.explore.finding_gains import FaultShape, PlaneGains
 from mutator.explore.lattice import Cell, Lattice
 from mutator.explore.plane_map import PlaneMap
 from mutator.model import Record
 
 RANDOM = "random"
-_BREADTH_SHARE = 4  # of this many proposals, one is in depth
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
     """A hazard of one fault in one scenario from one start on, with the smallest fault that reached it.
 
-    `plane` is the number of the plane. `cell` has the least product of magnitude and duration.
+    `plane` is the number of the plane. `cell` has the least product of magnitude and duration. It was driven,
+    or follows from a longer fault that reached the hazard while it was active.
     """
 
     plane: int  #: the number of the plane
     hazard: str  #: the hazard
     cell: Cell  #: the numbers of magnitude and duration
-    result: CellResult  #: the experiment, and when the hazard came
+    result: CellResult  #: the experiment that shows it, and when the hazard came
+    is_inferred: bool = False  #: whether the experiment's fault lasted longer
 
 
 @dataclass(slots=True)
@@ -44,8 +47,7 @@ class FindingSearch:
     planes: list[PlaneMap] = field(init=False)
     _proposed: dict[Proposal, None] = field(default_factory=dict)  # in their order
     _draws: int = 0  # of the strategy `random`, with those of cells that came before
-    _begun: set[int] = field(default_factory=set)  # planes that were proposed, and those with a hazard
-    _hazardous: set[int] = field(default_factory=set)
+    _ranking: "_PlaneRanking" = field(init=False)
 
     def __post_init__(self) -> None:
         self.planes = [
@@ -54,6 +56,7 @@ class FindingSearch:
             )
             for plane in self.section.planes
         ]
+        self._ranking = _PlaneRanking(self.section, [plane.lattice for plane in self.planes])
 
     def propose(self) -> list[Proposal]:
         """Return the next batch; empty once the budget is spent or nothing is left to drive."""
@@ -66,10 +69,8 @@ class FindingSearch:
         """Take the record of a proposed experiment."""
         plane, drive = self.planes[proposal.plane], self.drives[proposal.plane]
         duration_s = plane.lattice.durations_s[proposal.cell[1]]
-        result = judge_cell(record, duration_s, drive, self.section.observe_s)
-        plane.add(proposal.cell, result)
-        if result.state is CellState.HAZARDOUS:
-            self._hazardous.add(proposal.plane)
+        plane.add(proposal.cell, judge_cell(record, duration_s, drive, self.section.observe_s))
+        self._ranking.note(proposal, _first_hazardous(plane, proposal.cell))
 
     def finding_counts(self) -> list[int]:
         """Return the number of findings after each run, in the order in which they were proposed."""
@@ -106,90 +107,146 @@ class FindingSearch:
         return Proposal(plane, (line, int(generator.integers(len(lattice.durations_s)))))
 
     def _choose(self, count: int) -> list[Proposal]:
-        chosen: list[Proposal] = []
-        while len(chosen) < count:
-            is_depth_first = (len(self._proposed) + len(chosen)) % _BREADTH_SHARE == _BREADTH_SHARE - 1
-            proposal = (is_depth_first and self._next_in_depth(chosen)) or self._next_in_breadth()
-            proposal = proposal or self._next_in_depth(chosen)
-            if not proposal:
-                break
-            chosen.append(proposal)
-            self._begun.add(proposal.plane)
-        return chosen
+        proposals = (self._ranking.next_proposal() for _ in range(count))
+        return [proposal for proposal in proposals if proposal]
 
-    def _next_in_breadth(self) -> Proposal | None:
-        """Return the largest cell of the most promising plane that was not driven: its fault and its scenario
-        led to hazards in others, or were rarely tried.
+
+class _PlaneRanking:
+    """Which plane, and which of its cells, promises most. What results change is computed when they come."""
+
+    def __init__(self, section: ExplorationSection, lattices: Sequence[Lattice]) -> None:
+        planes = section.planes
+        self._shapes: dict[tuple[str, Lattice], FaultShape] = {}
+        self._keys = [(plane.spec, lattice) for plane, lattice in zip(planes, lattices, strict=True)]
+        self._numbers_by_key: dict[tuple[str, Lattice], list[int]] = {}
+        for number, key in enumerate(self._keys):
+            self._numbers_by_key.setdefault(key, []).append(number)
+            self._shapes.setdefault(key, FaultShape(key[1]))
+        traits = [_trait_numbers(values) for values in zip(*map(_traits_of, planes), strict=True)]
+        self._traits = np.array(traits)  # of each kind, for each plane
+        self._tried, self._hazardous = (
+            np.zeros((len(traits), 1 + self._traits.max()), dtype=int) for _ in range(2)
+        )
+        self._gains: dict[int, PlaneGains] = {}  # of planes that were begun
+        self._gain_values = np.zeros(len(planes))  # for new planes, if they had a hazard for sure
+        self._cells: list[Cell] = [(0, 0)] * len(planes)
+        self._is_new = np.ones(len(planes), dtype=bool)
+        for key in self._shapes:
+            self._rank_new(key)
+
+    def next_proposal(self) -> Proposal | None:
+        """Return what to drive next; None if all cells were driven or inferred."""
+        scores = np.where(self._is_new, self._gain_values * self._promises(), self._gain_values)
+        number = int(scores.argmax())
+        proposal = Proposal(number, self._cells[number]) if scores[number] > 0 else self._spare_proposal()
+        if proposal:
+            self._begin(proposal)
+        return proposal
+
+    def note(self, proposal: Proposal, first_hazardous: int | None) -> None:
+        """Take a result: the first hazardous duration of the cell's line that follows from it, None if it had
+        no hazard.
         """
-        tried = Counter(trait for number in self._begun for trait in self._traits(number))
-        hazardous = Counter(trait for number in self._hazardous for trait in self._traits(number))
+        number, cell = proposal.plane, proposal.cell
+        key = self._keys[number]
+        gains = self._gains.get(number)
+        if gains is None:  # drawn by chance
+            return
+        had_hazard = gains.has_hazard
+        self._shapes[key].count(gains, -1)
+        gains.note(cell, first_hazardous)
+        self._shapes[key].count(gains, 1)
+        if gains.has_hazard and not had_hazard:
+            self._hazardous[np.arange(len(self._traits)), self._traits[:, number]] += 1
+        self._rank(number)
+        if gains.has_hazard:
+            self._rank_new(key)
 
-        def promise(number: int) -> float:
-            return prod((hazardous[trait] + 1) / (tried[trait] + 2) for trait in self._traits(number))
+    def _promises(self, numbers: slice | int = slice(None)) -> np.ndarray:
+        """Return for planes, by default all, the estimated chance that they have a hazard."""
+        shares = (self._hazardous + 1) / (self._tried + 2)
+        promises = np.ones(())
+        for share, trait_numbers in zip(shares, self._traits, strict=True):
+            promises = promises * share[trait_numbers[numbers]]
+        return promises
 
-        new = (number for number in range(len(self.planes)) if number not in self._begun)
-        best = min(new, key=lambda number: (-promise(number), number), default=None)
-        return None if best is None else Proposal(best, self.planes[best].lattice.largest)
+    def _begin(self, proposal: Proposal) -> None:
+        number, cell = proposal.plane, proposal.cell
+        if number not in self._gains:
+            self._gains[number] = PlaneGains(self._keys[number][1])
+            self._is_new[number] = False
+            self._tried[np.arange(len(self._traits)), self._traits[:, number]] += 1
+        self._gains[number].awaited.add(cell)
+        self._rank(number)
 
-    def _traits(self, number: int) -> tuple[tuple[str, str], ...]:
-        plane = self.section.planes[number]
-        return ("fault", plane.spec), ("scenario", plane.scenario)
+    def _rank(self, number: int) -> None:
+        chances = self._shapes[self._keys[number]].chances()
+        promise = 1.0 if self._gains[number].has_hazard else float(self._promises(number))
+        self._gain_values[number], self._cells[number] = self._gains[number].best(chances, promise)
 
-    def _next_in_depth(self, chosen: Sequence[Proposal]) -> Proposal | None:
-        """Return a smaller or shorter cell of a plane with a hazard, the one with the fewest runs first."""
-        for number in sorted(self._hazardous, key=lambda number: (len(self.planes[number].results), number)):
-            proposals = (Proposal(number, cell) for cell in smaller_cells(self.planes[number]))
-            new = (p for p in proposals if p not in self._proposed and p not in chosen)
-            if proposal := next(new, None):
-                return proposal
+    def _rank_new(self, key: tuple[str, Lattice]) -> None:
+        gain, cell = PlaneGains(key[1]).best(self._shapes[key].chances(), 1.0)
+        for number in self._numbers_by_key[key]:
+            if self._is_new[number]:
+                self._gain_values[number], self._cells[number] = gain, cell
+
+    def _spare_proposal(self) -> Proposal | None:
+        """Return a cell of which nothing is expected, in the plane with the fewest cells that were driven."""
+        for number in sorted(self._gains, key=lambda n: (int(self._gains[n].is_driven.sum()), n)):
+            if cell := self._gains[number].spare_cell():
+                return Proposal(number, cell)
         return None
 
 
-def smaller_cells(plane: PlaneMap) -> Iterator[Cell]:
-    """Yield the cells that come next towards the smallest and shortest hazardous fault of a plane.
+def _traits_of(plane: ExploredPlane) -> tuple[str, ...]:
+    return plane.spec, plane.scenario, plane.start
 
-    On three paths, half the way from the smallest hazardous cell to the largest one that is not: with the
-    longest duration, with the largest magnitude, and with the smallest magnitude that is hazardous so far.
-    """
-    last_line, last_duration = plane.lattice.largest
-    smallest = min(
-        (line for (line, _), result in plane.results.items() if result.state is CellState.HAZARDOUS),
-        default=last_line,
-    )
-    paths = (
-        [(line, last_duration) for line in range(last_line + 1)],
-        [(last_line, duration) for duration in range(last_duration + 1)],
-        [(smallest, duration) for duration in range(last_duration + 1)],
-    )
-    for path in paths:
-        states = [plane.state(cell) for cell in path]
-        first = next((n for n, state in enumerate(states) if state and state.is_hazardous), len(path))
-        below = max((n for n in range(first) if states[n] is not None), default=-1)
-        if first - below > 1 and first < len(path):
-            yield path[(first + below) // 2]
+
+def _trait_numbers(values: Iterable[str]) -> list[int]:
+    numbers: dict[str, int] = {}
+    return [numbers.setdefault(value, len(numbers)) for value in values]
+
+
+def _first_hazardous(plane: PlaneMap, cell: Cell) -> int | None:
+    """Return the first duration of a cell's line that its result shows to be hazardous; None without one."""
+    result = plane.results[cell]
+    if result.state is not CellState.HAZARDOUS:
+        return None
+    if result.inferred_from_s is None:
+        return cell[1]
+    return next(j for j, d in enumerate(plane.lattice.durations_s) if d >= result.inferred_from_s)
 
 
 def _findings_of(number: int, plane: PlaneMap) -> Iterator[Finding]:
-    best: dict[str, tuple[float, Cell, CellResult]] = {}
+    best: dict[str, tuple[float, Finding]] = {}
     for cell, result in sorted(plane.results.items()):
-        if result.state is CellState.HAZARDOUS:
-            magnitude = plane.lattice.magnitudes[cell[0]]
-            size = abs(magnitude or 1.0) * plane.lattice.durations_s[cell[1]]
-            if result.hazard not in best or size < best[result.hazard][0]:
-                best[result.hazard] = size, cell, result
-    for hazard, (_, cell, result) in sorted(best.items()):
-        yield Finding(plane=number, hazard=hazard, cell=cell, result=result)
+        line, duration = cell
+        first = _first_hazardous(plane, cell)
+        if first is None:
+            continue
+        size = abs(plane.lattice.magnitudes[line] or 1.0) * plane.lattice.durations_s[first]
+        if result.hazard not in best or size < best[result.hazard][0]:
+            best[result.hazard] = (
+                size,
+                Finding(
+                    plane=number,
+                    hazard=result.hazard,
+                    cell=(line, first),
+                    result=result,
+                    is_inferred=first < duration,
+                ),
+            )
+    for _, (_, finding) in sorted(best.items()):
+        yield finding
 
 
 def dominated_share(plane: PlaneMap) -> float:
-    """Return the share of a plane's cells that are at least as large and long as a hazardous one: the nearer
-    to 1, the smaller and shorter the faults.
+    """Return the share of a plane's cells that are at least as large and long as a hazardous one, driven or
+    inferred: the nearer to 1, the smaller and shorter the faults.
     """
-    lines, durations = plane.lattice.largest
-    corners = [cell for cell, result in plane.results.items() if result.state is CellState.HAZARDOUS]
-    dominated = sum(
-        any(i <= line and j <= duration for i, j in corners)
-        for line in range(lines + 1)
-        for duration in range(durations + 1)
-    )
-    return dominated / plane.lattice.size
+    is_dominated = np.zeros((len(plane.lattice.magnitudes), len(plane.lattice.durations_s)), dtype=bool)
+    for cell in plane.results:
+        first = _first_hazardous(plane, cell)
+        if first is not None:
+            is_dominated[cell[0] :, first:] = True
+    return int(is_dominated.sum()) / plane.lattice.size

@@ -12,8 +12,9 @@ from mutator.explore.finding_search import Finding, FindingSearch
 
 FINDINGS_NOTE = (
     "A finding is a hazard of one fault in one scenario from one start on, with the smallest fault that "
-    "reached it (the least product of magnitude and duration). It is a bound: a smaller fault that was not "
-    "tried can do the same. `mutator shrink ID` searches its smallest form."
+    "reached it (the least product of magnitude and duration). Inferred durations were not driven: the "
+    "experiment's longer fault reached the hazard in that time, while active. It is a bound: a smaller "
+    "fault that was not tried can do the same. `mutator shrink ID` searches its smallest form."
 )
 
 

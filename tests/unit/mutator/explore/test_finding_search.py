@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from mutator.campaigns.exploration_section import ExplorationSection
-from mutator.explore.cell_results import CellResult, CellState, Drive
+from mutator.explore.cell_results import Drive
 from mutator.explore.exploration import BatchLoop, Proposal
-from mutator.explore.finding_search import FindingSearch, dominated_share, smaller_cells
-from mutator.explore.lattice import Lattice, durations_between, magnitudes_between
-from mutator.explore.plane_map import PlaneMap
+from mutator.explore.finding_search import FindingSearch, dominated_share
+from mutator.explore.lattice import durations_between, magnitudes_between
 from mutator.model import Outcome, Record, Status
 from tests.unit.mutator.explore.made_planes import STEP_S
 from tests.unit.mutator.explore.test_plane_exploration import PLANE
@@ -76,10 +75,10 @@ def test_the_same_search_comes_again() -> None:
 
 
 def test_no_cell_is_driven_twice() -> None:
-    """Also if the budget is larger than the number of cells that are worth a run."""
+    """Also if the budget is larger than what promises anything."""
     _, batches = searched("planes", budget=2_000)
     proposals = [proposal for batch in batches for proposal in batch]
-    assert len(set(proposals)) == len(proposals) < 2_000
+    assert len(set(proposals)) == len(proposals) == 2_000
 
 
 def test_chance_spends_its_budget() -> None:
@@ -95,8 +94,20 @@ def test_chance_spends_its_budget() -> None:
     assert len(set(proposals)) == len(proposals) == len(MAGNITUDES) * len(DURATIONS)
 
 
+def test_a_search_of_few_planes_spends_its_budget() -> None:
+    """Also in cells of which nothing is expected, until all were driven: one plane has 144."""
+    section = ExplorationSection(planes=PLANES[:1], goal="find", budget=1_000)
+    search = FindingSearch(section=section, drives=[Drive(start_s=0.0, end_s=60.0, step_s=STEP_S)], seed=1)
+    proposals = []
+    while batch := search.propose():
+        proposals += batch
+        for proposal in batch:
+            search.note(proposal, record_of(proposal))
+    assert len(set(proposals)) == len(proposals) == len(MAGNITUDES) * len(DURATIONS)
+
+
 def test_a_finding_is_the_smallest_fault_that_was_driven() -> None:
-    """At the end of the search, a fault of half its magnitude and duration has no hazard."""
+    """At the end of a long search, a fault of half its magnitude and duration has no hazard."""
     search, _ = searched("planes", budget=2_000)
     for finding in search.findings():
         line, duration = finding.cell
@@ -104,20 +115,18 @@ def test_a_finding_is_the_smallest_fault_that_was_driven() -> None:
         assert not is_hazardous(finding.plane, MAGNITUDES[line] / 2, DURATIONS[duration] / 2)
 
 
-def test_paths_to_smaller_faults_end() -> None:
-    """Each next cell of a plane is new, until the smallest hazardous cells on all paths have neighbours
-    without hazard.
+def test_a_finding_is_inferred_where_causality_proves_it() -> None:
+    """A fault of 15 s reached its hazard after 2 s, while it was active, so one of 2.02 s does, too. The
+    finding is the shortest one of the lattice that is as long, and the driven experiment shows it.
     """
-    plane = PlaneMap(Lattice(magnitudes=MAGNITUDES, durations_s=DURATIONS))
-    plane.add(plane.lattice.largest, CellResult(state=CellState.HAZARDOUS, experiment_id="", hazard="H1"))
-    count = 0
-    while cell := next(smaller_cells(plane), None):
-        assert cell not in plane.results
-        hazardous = is_hazardous(0, MAGNITUDES[cell[0]], DURATIONS[cell[1]])
-        state = CellState.HAZARDOUS if hazardous else CellState.WITHOUT_HAZARD
-        plane.add(cell, CellResult(state=state, experiment_id="", hazard="H1"))
-        count += 1
-    assert count <= 16
+    search, _ = searched("planes", budget=0)
+    record = replace(record_of(Proposal(0, (15, 8))), outcome=Outcome.HAZARD, hazards=(("H1", 2.0),))
+    search.note(Proposal(0, (15, 8)), record)
+    [finding] = search.findings()
+    line, duration = finding.cell
+    assert line == 15 and DURATIONS[duration - 1] < 2.02 <= DURATIONS[duration]
+    assert finding.is_inferred and finding.result.experiment_id == record.experiment_id
+    assert dominated_share(search.planes[0]) == (9 - duration) / (16 * 9)
 
 
 def test_findings_are_counted_after_each_run() -> None:
