@@ -19,7 +19,7 @@ from mutator.targets.observed_values import ObservedValue
 from mutator.triggers.conditions import RESERVED_NAMES, canonical_condition, canonical_formula
 
 SCHEMA = "defence/1"
-_RESERVED_NAMES = (*RESERVED_NAMES, "math", "sensed")
+_RESERVED_NAMES = (*RESERVED_NAMES, "math", "values", "senses", "is_active")
 
 
 class SenseModel(StrictModel, title="A sensed value"):

@@ -75,24 +75,38 @@ def render_runtime(
 def _settings_of(defence: Defence, index_by_name: Mapping[tuple[bool, str], int]) -> dict[str, object]:
     return {
         "module": defence_module_name(defence.name),
-        "decision": _decision_source(defence),
+        "decision": _decision_source(defence, index_by_name),
         "constructor": _constructor_source(defence, index_by_name),
     }
 
 
-def _decision_source(defence: Defence) -> str:
-    """Return the function that decides from sensed values whether a defence acts, and whether it lets go."""
-    senses = [sense.name for sense in defence.senses]
-    steps = [(parameter.name, repr(parameter.value)) for parameter in defence.parameters]
+def _decision_source(defence: Defence, index_by_name: Mapping[tuple[bool, str], int]) -> str:
+    """Return the function that tells whether the condition holds for the next change of a defence's state,
+    and what is sensed.
+    """
+    steps = [
+        (sense.name, _reading_source(sense, number, index_by_name[sense.is_truth, sense.value]))
+        for number, sense in enumerate(defence.senses)
+    ]
+    steps += [(parameter.name, repr(parameter.value)) for parameter in defence.parameters]
     steps += [(value.name, to_python_source(value.text, is_formula=True)) for value in defence.derived]
-    sensed = [*senses, *(value.name for value in defence.derived)]
+    acts, lets_go = map(to_python_source, (defence.acts_when, defence.lets_go_when))
+    sensed = "".join(f"{name}, " for name in sensed_names(defence))
     lines = [
-        f"def _decide_{defence.name}({', '.join(senses)}):",
+        f"def _decide_{defence.name}(t, values, senses, is_active):",
         *(f"    {name} = {code}" for name, code in steps),
-        f"    sensed = {{{', '.join(f'{name!r}: {name}' for name in sensed)}}}",
-        f"    return {to_python_source(defence.acts_when)}, {to_python_source(defence.lets_go_when)}, sensed",
+        f"    return ({lets_go}) if is_active else ({acts}), ({sensed})",
     ]
     return "\n".join(lines)
+
+
+def _reading_source(sense: Sense, number: int, index: int) -> str:
+    return f"senses[{number}].read(t, values)" if sense.delay_s or sense.noise else f"values[{index}]"
+
+
+def sensed_names(defence: Defence) -> tuple[str, ...]:
+    """Return the names of sensed and derived values."""
+    return (*(sense.name for sense in defence.senses), *(value.name for value in defence.derived))
 
 
 def _constructor_source(defence: Defence, index_by_name: Mapping[tuple[bool, str], int]) -> str:
@@ -107,6 +121,7 @@ def _constructor_source(defence: Defence, index_by_name: Mapping[tuple[bool, str
         f"{defence_module_name(defence.name)}.Model({numbers})",
         f"_decide_{defence.name}",
         repr([input_of(sense) for sense in defence.senses]),
+        repr(sensed_names(defence)),
         repr(defence.commands),
         repr(defence.acts_after_s),
         repr(defence.lets_go_after_s),

@@ -8,6 +8,7 @@ from typing import Any
 from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.config.yaml_files import StrictModel
+from mutator.defences import defence_yaml
 from mutator.execution.cluster import cluster_files
 from mutator.families import family_yaml
 from mutator.faults import fault_model_files, library_readings
@@ -55,6 +56,7 @@ _FIXED_FORMATS: tuple[tuple[type[StrictModel], str, str], ...] = (
     (library_readings.ReadingsModel, library_readings.SCHEMA, "readings.yaml"),
     (campaign_model.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (family_yaml.FamilyModel, family_yaml.FAMILY_SCHEMA, "families/*.yaml"),
+    (defence_yaml.DefenceModel, defence_yaml.SCHEMA, "defences/*.yaml"),
     (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
     (severity_yaml.SeverityScaleModel, severity_yaml.SCHEMA, "severity/*.yaml"),
     (accidents_and_hazards.HazardsModel, accidents_and_hazards.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
