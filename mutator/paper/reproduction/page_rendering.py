@@ -19,10 +19,12 @@ from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_tables import HEADS, Row, StudyTables, tally_of_row
 from mutator.paper.reproduction.tally_texts import (
     AGREEMENT_LABELS,
+    NEAR_POINTS,
     NOTHING,
     agreement_cells,
     count_text,
     percent_text,
+    points_between,
     share_of_tally,
     with_difference,
 )
@@ -204,7 +206,32 @@ class StudyPages:
             rows.append((label, "", *(cell or "-" for cell in cells)))
         rows.append(self._total_row("hazards, random", RANDOM, "hazards"))
         heads = ("of activated faults, guided except in the last line", PAPER, *(c.title for c in self.whole))
-        return _markdown(heads, rows)
+        return f"{_markdown(heads, rows)}\n\n{self._summary_lines()}"
+
+    def _summary_lines(self) -> str:
+        """List by fixed rules which campaigns are near the paper, and which rank fault types as it does."""
+        sources = self._tallies_by_source(GUIDED, self._scenarios(GUIDED))
+        published, *totals = (sum_tallies(tallies) for _, tallies in sources)
+        near: dict[str, list[str]] = {"hazards": [], "hazards_no_alerts": [], "alerts": []}
+        for campaign, total in zip(self.whole, totals, strict=True):
+            for part, titles in near.items():
+                if total.activated and abs(points_between(total, published, part)) <= NEAR_POINTS:
+                    titles.append(campaign.title)
+        ranked = [
+            campaign.title
+            for campaign in self.whole
+            for row in self.tables.rows("agreement", campaign=campaign.name, fault_types=ALL_TYPES)
+            if float(row["low"]) > 0
+        ]
+        lines = [
+            f"* {label} within ten points of the paper's: {_joined(near[part])}"
+            for label, part in (
+                ("hazards", "hazards"),
+                ("hazards without an alert", "hazards_no_alerts"),
+                ("alerts", "alerts"),
+            )
+        ]
+        return "\n".join((*lines, f"* rank correlation above 0, with its whole interval: {_joined(ranked)}"))
 
     def agreement_table(self) -> str:
         """Tabulate what agrees with the paper in guided experiments, and what does not, for each campaign."""
@@ -292,6 +319,11 @@ class StudyPages:
         rows: list[Row] = self.tables.rows("fault_types", campaign=campaign, method=method)
         by_name = {row["fault_type"]: tally_of_row(row) for row in rows}
         return sum_tallies(by_name.get(kind, NOTHING) for kind in kinds)
+
+
+def _joined(titles: Sequence[str]) -> str:
+    """Return `as coded; as described`, or `no campaign`."""
+    return "; ".join(titles) or "no campaign"
 
 
 def _interval_text(row: Row) -> str:

@@ -56,3 +56,28 @@ def test_the_results_page_names_runs_digests_and_fault_free_alerts() -> None:
     for text in ("`coded_2_75`", "`" + "c" * 64 + "`", "fcw at 2.00 s", "commit\n`" + "ab" * 6 + "`"):
         assert text in page, text
     assert made_up_pages().tables.digest() in page and "| 1.1* |" in page
+
+
+def test_the_summary_says_by_rules_which_campaigns_are_near() -> None:
+    study = made_up_pages()
+    assert "* hazards within ten points of the paper's: as described; as coded; " in study.summary_table()
+    rows = [row for row in study.tables.rows("scenarios") if row["method"] == "guided"]
+    for row in rows:
+        if row["campaign"] == "described":
+            place = study.tables.rows("scenarios").index(row)
+            study = with_cells(study, "scenarios", place, hazards="0", hazards_no_alerts="0", alerts="0")
+    text = study.summary_table()
+    assert "* hazards within ten points of the paper's: as coded; " in text
+    assert "with its whole interval: as described; as coded" in text
+
+
+def test_what_the_page_says_of_alerts_is_what_its_table_shows() -> None:
+    """On the reference plant, S2 and S4 have too many alerts, S5 too few, and the total is the paper's."""
+    page = (CLONE / DIFFERENCES_PAGE).read_text(encoding="utf-8")
+    block = page.split("<!-- study: alerts -->", 1)[1].split("<!-- end of study -->", 1)[0]
+    [line] = [line for line in block.splitlines() if line.startswith("| as coded, reference plant |")]
+    differences = re.findall(r"\((\*{0,2})([+-]\d+)\*{0,2}\)", line)
+    is_far = [bool(stars) for stars, _ in differences]
+    assert [is_far[index] for index in (1, 3, 4, 5)] == [True, True, True, False]
+    points = [int(number) for _, number in differences]
+    assert points[1] > 0 and points[3] > 0 and points[4] < 0
