@@ -43,6 +43,7 @@ from mutator.statistics.fault_free_drive_tables import (
 )
 from mutator.statistics.mutation_score import mutation_score_sheet, totals_table
 from mutator.statistics.results_frame import prepare_results
+from mutator.statistics.sample_weights import with_weights
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import run_deletion
 from mutator.store.golden_files import GOLDEN_FOLDER, stored_golden_keys
@@ -147,14 +148,14 @@ class Run(RunFigures):
         actuator, raised a new alert, caused a hazard; in total, by operator and by function. Empty without
         such mutants.
         """
-        frame = self._results_frame
-        if not (frame["module"] == OPERATOR_FAULTS_MODULE).any():
-            return mutation_score_sheet(prepare_results(frame), {}, None)
+        usable = with_weights(prepare_results(self._results_frame), self.path)
+        if not (usable["module"] == OPERATOR_FAULTS_MODULE).any():
+            return mutation_score_sheet(usable, {}, None)
         try:
             alerts = alerts_by_scenario_and_seed(self.fault_free())
         except (MutatorError, KeyError):  # without target or golden runs, alerts cannot be compared
             alerts = None
-        return mutation_score_sheet(prepare_results(frame), self.faults, alerts, self.folder.head.operators)
+        return mutation_score_sheet(usable, self.faults, alerts, self.folder.head.operators)
 
     def mutation_totals(self) -> TextTable:
         """Return the rows of `mutation_score` for all operator mutants. Empty without such mutants."""

@@ -6,6 +6,7 @@ activated mutants; others are listed separately.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from mutator._common.table_rendering import TextTable
 from mutator.model import OPERATOR_FAULTS_MODULE, Fault, Status
 from mutator.results.table_columns import alert_names_in
 from mutator.statistics.paired_statistics import resampled_interval
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.shares_with_intervals import Share, share_with_interval
 from mutator.statistics.statistics_sheet import Sheet, SheetCell, cell_text
 from mutator.triggers.trigger_kinds import ALWAYS_NAME
@@ -121,13 +123,24 @@ def mutation_score_sheet(
         if len(operator_notes) > 1 and any(" draw" in text for text in operator_notes)
         else ""
     )
+    lines = tuple(_sheet_lines(drives))
+    if WEIGHT_COLUMN in frame:
+        lines = tuple(tuple(map(_without_rate, line)) for line in lines)
+        without += " The experiments are a sample, so shares of all mutants are not known."
     return Sheet(
         name="mutation_score",
         title="Mutation score",
         note=_NOTE + ("" if golden_alerts is not None else _UNKNOWN_ALERTS_NOTE) + chosen + without,
         heads=_COLUMN_HEADS,
-        lines=tuple(_sheet_lines(drives)),
+        lines=lines,
     )
+
+
+def _without_rate(cell: SheetCell) -> SheetCell:
+    """Return a share as its counts alone; any other cell as it is."""
+    if not isinstance(cell, Share):
+        return cell
+    return replace(cell, low=math.nan, high=math.nan, weighted_rate=math.nan)
 
 
 def totals_table(sheet: Sheet) -> TextTable:

@@ -127,3 +127,10 @@ def test_intervals_of_drives_resample_mutants(faults: dict[str, Fault]) -> None:
     alike = results(*(drive(name, HIT) for name in "ab" for _ in range(2)))
     told = lines(mutation_score_sheet(alike, faults, GOLDEN))["all", "drives", "permanent"]["hazard"]
     assert str(told) == "100.0 % (4/4)"
+
+
+def test_a_sample_of_mutants_has_counts_but_no_rates(faults: dict[str, Fault]) -> None:
+    frame = results(drive("a", HIT), drive("b", CHANGED), drive("c", {})).assign(weight=2.0)
+    sheet = mutation_score_sheet(frame, faults, GOLDEN)
+    assert str(lines(sheet)["all", "mutants", "permanent"]["hazard"]) == "- (1/2)"
+    assert "are a sample" in sheet.note
