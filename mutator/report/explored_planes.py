@@ -53,7 +53,7 @@ TABLE_NOTE = (
     "and “hazard after” are of the largest magnitude: up to which duration all cells are called without "
     "hazard, and the time from the start of the longest fault to its hazard. “Validation” is the last look; "
     "the shares of all looks together hold at 95 %. Links open the run that shows the first hazard, beside a "
-    "shorter one without."
+    "shorter one without. Cells called hazardous between runs are interpolated: validations do not draw them."
 )
 _CHALLENGE_HEADS = (
     "fault",
