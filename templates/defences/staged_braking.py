@@ -25,4 +25,5 @@ class Model:
         for stops_at, deceleration in self._later_stages:
             if sensed["ttc"] < sensed["v_ego"] / stops_at:
                 self._deceleration = max(self._deceleration, deceleration)
-        return {"gas": (-math.inf, 0.0), "deceleration": (self._deceleration, math.inf)}
+        lowest = self._deceleration
+        return {"gas": (-math.inf, 0.0), "deceleration": (lowest, math.inf)}
