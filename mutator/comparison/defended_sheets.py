@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-import pandas as pd
 
 from mutator.comparison.defended_pairs import DefendedPair, PairOutcome
 from mutator.comparison.defended_sets import DefendedSet
@@ -85,6 +84,8 @@ def _rates_sheet(sets: Iterable[DefendedSet]) -> Sheet:
 
 
 def _rate_line(defended: DefendedSet) -> tuple[SheetCell, ...]:
+    import pandas as pd
+
     compared = [pair for pair in defended.pairs if pair.outcome is not PairOutcome.NOT_COMPARED]
     before = pd.Series([bool(pair.undefended.hazards) for pair in compared], dtype=bool)
     after = pd.Series([bool(pair.defended.hazards) for pair in compared], dtype=bool)

@@ -2,8 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator.comparison.compared_runs import ComparedRun
 from mutator.comparison.experiment_matching import ExperimentPair
@@ -17,6 +16,9 @@ from mutator.statistics.metric_and_severity_tables import describe_severity_clas
 from mutator.statistics.paired_statistics import wilcoxon_p
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
 from mutator.targets.hazard_severity import SEVERITY_CLASSES, SeverityScale
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NO_CLASS = "no class"
 
@@ -48,10 +50,12 @@ def metrics_sheets(
 
 def _metric_values(
     pairs: Sequence[ExperimentPair], a: ComparedRun, b: ComparedRun, name: str
-) -> pd.DataFrame:
+) -> "pd.DataFrame":
     """Return the pairs in which both runs have a value of the metric. Columns: `kind`, `fault`, `first`,
     `second`.
     """
+    import pandas as pd
+
     rows = [
         (p.row_a.kind, p.row_a.fault, a.metrics_by_id[p.a.id].get(name), b.metrics_by_id[p.b.id].get(name))
         for p in pairs
@@ -59,7 +63,7 @@ def _metric_values(
     return pd.DataFrame(rows, columns=["kind", "fault", "first", "second"]).dropna()
 
 
-def _median_cells(frame: pd.DataFrame) -> tuple[SheetCell, ...]:
+def _median_cells(frame: "pd.DataFrame") -> tuple[SheetCell, ...]:
     first, second = frame["first"], frame["second"]
     estimate = median_difference(first, second, frame["fault"])
     medians = (float(first.median()), float(second.median()))

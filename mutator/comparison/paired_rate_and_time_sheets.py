@@ -4,8 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from mutator.comparison.experiment_matching import ExperimentPair, ResultChangeKind, time_to_hazard
 from mutator.model import Outcome, Status
@@ -16,6 +15,9 @@ from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
 from mutator.statistics.weighted_shares import share_of_runs
 from mutator.store.plan_strata import Stratum
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TIME_COLUMN_BY_EVENT = {
     "activated": "t_activation",
@@ -29,7 +31,7 @@ TIME_SPAN_NAMES = ("activation to manifest", "activation to alert", "activation 
 
 def usable_pair_events(
     pairs: Sequence[ExperimentPair], stratum_by_id: Mapping[str, tuple[Stratum, int]] | None = None
-) -> pd.DataFrame:
+) -> "pd.DataFrame":
     """Return a frame with a row for each pair that has valid results in both runs.
 
     Columns: `kind` (`sensor/bias`), `fault_id` (the resampling unit: variant and value), flags `activated_a`,
@@ -37,6 +39,8 @@ def usable_pair_events(
     first run is a sample, `stratum_by_id` has the stratum of each of its experiments, with the stratum's
     size, and the column `weight` says how many planned experiments a pair stands for.
     """
+    import pandas as pd
+
     rows = [
         {
             "kind": p.row_a.kind,
@@ -84,7 +88,7 @@ class RunDisplayNames:
     b: str
 
 
-def rates_sheets(frame: pd.DataFrame, names: RunDisplayNames) -> tuple[Sheet, Sheet]:
+def rates_sheets(frame: "pd.DataFrame", names: RunDisplayNames) -> tuple[Sheet, Sheet]:
     total_lines = tuple((flag, *_rate_cells(frame, flag)) for flag in TIME_COLUMN_BY_EVENT)
     type_lines: list[tuple[SheetCell, ...]] = []
     for flag in TIME_COLUMN_BY_EVENT:
@@ -104,7 +108,7 @@ def rates_sheets(frame: pd.DataFrame, names: RunDisplayNames) -> tuple[Sheet, Sh
     return total_and_type_sheets("rates", "Rates of events", note, ("what", heads), total_lines, type_lines)
 
 
-def _rate_cells(frame: pd.DataFrame, flag: str) -> tuple[SheetCell, ...]:
+def _rate_cells(frame: "pd.DataFrame", flag: str) -> tuple[SheetCell, ...]:
     first, second = frame[f"{flag}_a"], frame[f"{flag}_b"]
     weights = frame.get(WEIGHT_COLUMN)
     m, change = mcnemar_test(first, second), rate_difference(first, second, frame["fault_id"], weights)
@@ -117,7 +121,7 @@ def _rate_cells(frame: pd.DataFrame, flag: str) -> tuple[SheetCell, ...]:
     )
 
 
-def times_sheets(frame: pd.DataFrame, names: RunDisplayNames) -> tuple[Sheet, Sheet]:
+def times_sheets(frame: "pd.DataFrame", names: RunDisplayNames) -> tuple[Sheet, Sheet]:
     complete_pairs = {
         name: frame[frame[[f"{name}_a", f"{name}_b"]].notna().all(axis=1)] for name in TIME_SPAN_NAMES
     }
@@ -145,7 +149,7 @@ def times_sheets(frame: pd.DataFrame, names: RunDisplayNames) -> tuple[Sheet, Sh
     )
 
 
-def _time_cells(frame: pd.DataFrame, name: str) -> tuple[SheetCell, ...]:
+def _time_cells(frame: "pd.DataFrame", name: str) -> tuple[SheetCell, ...]:
     t = paired_times(frame[f"{name}_a"], frame[f"{name}_b"])
     return (
         t.pair_count,
