@@ -2,10 +2,10 @@
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 
@@ -17,6 +17,9 @@ from mutator.execution.worker_problems import describe_problem, reported_error
 
 PROBLEM_KEY = "mutator_problem"
 _COMMON_MARKER = "mutator"
+
+
+SourceT = TypeVar("SourceT", bound="ItemSource")
 
 
 class ItemSource(ABC):
@@ -95,18 +98,38 @@ class ExperimentItem(CampaignItem):
 
 
 class CampaignFile(pytest.File):
-    """A campaign's file."""
+    """A campaign's file, with the items of its run without defences, and of those with its sets."""
 
-    def __init__(self, *, source: ItemSource, **keywords: Any) -> None:
+    def __init__(self, *, sources: Sequence[ItemSource], **keywords: Any) -> None:
         super().__init__(**keywords)
-        self._source = source
+        self._sources = sources
 
     def collect(self) -> Iterator[ExperimentItem]:
-        listing = self._source.listing
-        if listing.problem:
-            raise self.CollectError(listing.problem)
-        for listed in listing.items:
-            yield ExperimentItem.from_parent(self, name=listed.name, listed=listed, source=self._source)
+        for source in self._sources:
+            if source.listing.problem:
+                raise self.CollectError(source.listing.problem)
+            for listed in source.listing.items:
+                yield ExperimentItem.from_parent(self, name=listed.name, listed=listed, source=source)
+
+
+def key_of_set(defence_set: str, name: str) -> str:
+    """Return the name of an item, or of a source of items, with a set of defences."""
+    return f"{defence_set}--{name}"
+
+
+def sources_of_sets(path: Path, sources: Mapping[str, SourceT]) -> list[SourceT]:
+    """Return the sources of a campaign's runs with defences."""
+    return [source for key, source in sources.items() if key != file_of(key) == os.path.realpath(path)]
+
+
+def key_in_file(path: str, defence_set: str) -> str:
+    """Return the key of a campaign's run with a set of defences; its run without has the file's path."""
+    return f"{path}::{defence_set}"
+
+
+def file_of(key: str) -> str:
+    """Return the path of a source's file."""
+    return key.partition("::")[0]
 
 
 def node_id_of_file(session: pytest.Session, path: Path) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +76,7 @@ class FileRun(ItemSource):
     ) -> None:
         super().__init__()
         self.path, self.out = path, out
+        self.title = path.stem  # what summaries call it
         self._workspace, self._options, self._notify = workspace, options, notify
         self.failure: MutatorError | None = None  # why it could not begin
         self._has_begun = False
@@ -208,9 +210,7 @@ class CampaignRun(SessionRun):
         session = self._open.enter_context(
             open_session(
                 self._workspace,
-                lambda: open_or_freeze_run(
-                    self._workspace, self.path, out, Choices(), reviewed=options.reviewed
-                ),
+                lambda: self._open_folder(out),
                 out,
                 workers=options.workers,
                 accept_versions=options.accept_versions,
@@ -221,6 +221,9 @@ class CampaignRun(SessionRun):
         self._check_plan(session.folder)
         session.prepare(options.packages)
         return SessionItems(session=session, expectation=self._expectation)
+
+    def _open_folder(self, out: Path) -> RunFolder:
+        return open_or_freeze_run(self._workspace, self.path, out, Choices(), reviewed=self._options.reviewed)
 
     @cached_property
     def _plan(self) -> Plan:
@@ -270,5 +273,6 @@ class CampaignRun(SessionRun):
         plan = self._plan
         manifest = self._workspace.manifest(plan.campaign.target)
         sources = self._key_of_sources(RunInputs.of_plan(self._workspace, manifest, plan.tally))
-        key = content_id([plan.digest, plan.campaign.file_bytes.decode(), *sources])
+        defences = [self._workspace.defence(name).digest for name in chain(*plan.campaign.defence_sets)]
+        key = content_id([plan.digest, plan.campaign.file_bytes.decode(), *sources, *defences])
         return path_below(campaign_runs_folder(), f"{plan.campaign.name}-{key}")

@@ -8,8 +8,11 @@ from pkgutil import resolve_name
 import pytest
 
 from mutator.campaigns.campaign_files import load_campaign
+from mutator.defences.defence_facts import set_name
 from mutator.errors import MutatorError
+from mutator.execution.campaign_items import key_in_file
 from mutator.execution.campaign_runs import CampaignOptions, CampaignRun, FileRun
+from mutator.execution.defended_campaign_runs import DefendedCampaignRun
 from mutator.execution.distributor_choice import Distributor, choose_distributor, packages_of_distributor
 from mutator.execution.progress_text import ProgressLines
 from mutator.execution.regression_runs import RegressionRun
@@ -76,8 +79,19 @@ def _campaign_runs(
     for file in files:
         path = file.resolve() if is_regression_file(file) else workspace.campaign(file).resolve()
         kind = RegressionRun if is_regression_file(file) else _kind_of_campaign(path)
-        runs[os.path.realpath(file)] = kind(path, workspace, options, out=out, notify=notify)
+        run = runs[os.path.realpath(file)] = kind(path, workspace, options, out=out, notify=notify)
+        if isinstance(run, CampaignRun):
+            for names in _defence_sets(path):
+                key = key_in_file(os.path.realpath(file), set_name(names))
+                runs[key] = DefendedCampaignRun(run, names, workspace, options, notify=notify)
     return runs
+
+
+def _defence_sets(path: Path) -> tuple[tuple[str, ...], ...]:
+    try:
+        return load_campaign(path).defence_sets
+    except MutatorError:  # collecting the file names its mistake
+        return ()
 
 
 def _kind_of_campaign(path: Path) -> type[FileRun]:

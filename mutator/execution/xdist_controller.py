@@ -23,8 +23,10 @@ from mutator.execution.campaign_items import (
     CampaignItem,
     ItemSource,
     collect_alone,
+    file_of,
     node_id_of_file,
     source_of,
+    sources_of_sets,
 )
 from mutator.execution.campaign_runs import FileRun
 from mutator.execution.item_running import ItemRunner, ItemsStart
@@ -141,7 +143,7 @@ class CampaignController:
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if session.config.pluginmanager.hasplugin("dsession") or not self._is_alone:
             return None  # xdist's hook collects nothing in this process
-        [path] = self._sources
+        path, *_ = self._sources
         file = self._make_file(Path(path), session, nodeid=node_id_of_file(session, Path(path)))
         return collect_alone(session, file)
 
@@ -152,7 +154,8 @@ class CampaignController:
     def _make_file(self, path: Path, parent: pytest.Collector, **more: Any) -> pytest.File:
         source = source_of(path, self._sources)
         assert source is not None
-        return CampaignFile.from_parent(parent, path=path, source=source, **more)
+        sources = [source, *sources_of_sets(path, self._sources)]
+        return CampaignFile.from_parent(parent, path=path, sources=sources, **more)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if problem := dict(report.user_properties).get(PROBLEM_KEY):
@@ -195,22 +198,24 @@ class CampaignController:
     def _note_collection(self, node: Any, collection: Sequence[str]) -> None:
         self._node_ids = list(collection)
 
-    def _selected_files(self, root: Path) -> set[str]:
-        """Return the files of which an item is selected."""
+    def _selected_sources(self, root: Path) -> set[str]:
+        """Return the keys of the sources of which an item is selected."""
         files = {os.path.realpath(root / name) for name in {i.partition("::")[0] for i in self._node_ids}}
-        if not files.isdisjoint(self._sources):
-            return files
         # outside of the folder of pytest's settings, a node id has no path
+        has_paths = not files.isdisjoint(self._sources)
         names = {node_id.rpartition("::")[2] for node_id in self._node_ids}
-        return {
-            path
-            for path, source in self._sources.items()
-            if not names.isdisjoint(item.name for item in source.listing.items)
-        }
+        selected = set()
+        for key, source in self._sources.items():
+            if has_paths and file_of(key) not in files:
+                continue
+            # without an item, a set of defences is not even checked
+            if (has_paths and key == file_of(key)) or not names.isdisjoint(_item_names(source)):
+                selected.add(key)
+        return selected
 
     def _begin_workers(self, config: pytest.Config, nodes: Iterable[Any]) -> None:
         """Send workers what they need, before their first item."""
-        selected = self._selected_files(config.rootpath)
+        selected = self._selected_sources(config.rootpath)
         for node in nodes:
             if node in self._begun_nodes:
                 continue
@@ -223,6 +228,10 @@ class CampaignController:
             node.sendcommand(START_COMMAND, starts=starts)
             if self._checks is not None:
                 self._checks.note_worker_began(node)
+
+
+def _item_names(source: ItemSource) -> Iterable[str]:
+    return (item.name for item in source.listing.items)
 
 
 class StandaloneController(CampaignController):
@@ -247,7 +256,7 @@ class StandaloneController(CampaignController):
             if run.failure is not None:
                 session.exitstatus = run.failure.exit_code
             if summary is not None:
-                title = f"{run.path.stem}: " if len(self._runs) > 1 else ""
+                title = f"{run.title}: " if len(self._runs) > 1 else ""
                 self._closing_lines += _summary_lines(run, summary, title)
                 session.exitstatus = _exit_status(session, run, summary)
 
@@ -282,12 +291,14 @@ class ClusterItem(CampaignItem):
 class ClusterFile(pytest.File):
     """The file of a campaign that a cluster runs."""
 
-    def __init__(self, *, run: FileRun, distributor: WorkDistributor, **keywords: Any) -> None:
+    def __init__(self, *, runs: Sequence[FileRun], distributor: WorkDistributor, **keywords: Any) -> None:
         super().__init__(**keywords)
-        self._run, self._distributor = run, distributor
+        self._runs, self._distributor = runs, distributor
 
     def collect(self) -> Iterable[ClusterItem]:
-        yield ClusterItem.from_parent(self, name="cluster", run=self._run, distributor=self._distributor)
+        for run in self._runs:
+            name = "cluster" if run is self._runs[0] else f"cluster, {run.title}"
+            yield ClusterItem.from_parent(self, name=name, run=run, distributor=self._distributor)
 
 
 class ClusterController(StandaloneController):
@@ -301,7 +312,8 @@ class ClusterController(StandaloneController):
         run = self._runs[os.path.realpath(path)]
         if run.deals_work:
             return super()._make_file(path, parent, **more)
-        return ClusterFile.from_parent(parent, path=path, run=run, distributor=self._distributor, **more)
+        runs = [run, *sources_of_sets(path, self._runs)]
+        return ClusterFile.from_parent(parent, path=path, runs=runs, distributor=self._distributor, **more)
 
 
 def _is_stopped(session: pytest.Session) -> bool:

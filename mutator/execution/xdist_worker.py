@@ -19,6 +19,7 @@ from mutator.execution.campaign_items import (
     collect_alone,
     node_id_of_file,
     source_of,
+    sources_of_sets,
 )
 from mutator.execution.golden_facts import GoldenFacts
 from mutator.execution.item_running import FinishedItems, ItemRunner, ItemsStart
@@ -92,14 +93,18 @@ class WorkerPlugin:
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if not self._is_alone:
             return None
-        [(path, source)] = self._sources.items()
+        path, *_ = self._sources
         node_id = node_id_of_file(session, Path(path))
-        file = CampaignFile.from_parent(session, path=Path(path), source=source, nodeid=node_id)
+        sources = [*self._sources.values()]
+        file = CampaignFile.from_parent(session, path=Path(path), sources=sources, nodeid=node_id)
         return collect_alone(session, file)
 
     def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> CampaignFile | None:
         source = source_of(file_path, self._sources)
-        return CampaignFile.from_parent(parent, path=file_path, source=source) if source else None
+        if source is None:
+            return None
+        sources = [source, *sources_of_sets(file_path, self._sources)]
+        return CampaignFile.from_parent(parent, path=file_path, sources=sources)
 
     def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
         output = self._config.workeroutput  # type: ignore[attr-defined]

@@ -18,7 +18,7 @@ from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
-from .command import Bytes, results
+from .command import Bytes, Command, pytest_words, results
 
 CopyToycar = Callable[[Path], Workspace]
 SETS = ("emergency_brake", "pedal_limit+emergency_brake")
@@ -285,3 +285,29 @@ def test_a_defended_run_says_how_it_ended(places: tuple[Workspace, Path]) -> Non
     assert (braked["authority_brake"] == 1.0).all()
     assert (braked["after_fault_s"] >= 0.0).all()
     assert not defended["driver_at_end"].any()
+
+
+@pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
+def test_pytest_shows_the_experiments_of_each_set(
+    places: tuple[Workspace, Path], tmp_path: Path, workers: int
+) -> None:
+    """An item for each experiment of each set, and the same bytes as by `mutator run`."""
+    words = [*pytest_words(tmp_path / "run", "defended", workers), "-v", "--campaign-no-reuse"]
+    told = Command(places[0], tmp_path / "run", *words).end()
+    count = RunFolder.open(places[1]).head.experiments
+    assert f"{3 * count} passed" in told, told
+    for name in SETS:
+        assert told.count(f"::{name}--sensor/") >= count
+    assert results_of_all(tmp_path / "run") == results_of_all(places[1])
+
+
+@pytest.mark.slow
+def test_a_killed_command_is_resumed_in_its_set(places: tuple[Workspace, Path], tmp_path: Path) -> None:
+    """Killed while a set runs, the same command goes on there, and the bytes are those of a whole run."""
+    run = tmp_path / "run"
+    words = ("-m", "mutator", "run", "defended", "--out", str(run), "-n", "2", "--no-reuse", "--no-stills")
+    command = Command(places[0], run, *words)
+    command.wait_for(run / "defended" / SETS[0] / "records")
+    command.kill()
+    assert "hazard" in Command(places[0], run, *words).end()
+    assert results_of_all(run) == results_of_all(places[1])

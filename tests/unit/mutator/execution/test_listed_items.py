@@ -124,7 +124,7 @@ def test_collecting_5000_experiments_costs_at_most_two_seconds(
 
     class Collecting:
         def pytest_collect_file(self, file_path: Path, parent: pytest.Collector) -> CampaignFile:
-            return CampaignFile.from_parent(parent, path=file_path, source=Many())
+            return CampaignFile.from_parent(parent, path=file_path, sources=[Many()])
 
         def pytest_collection_finish(self, session: pytest.Session) -> None:
             counted.append(len(session.items))
