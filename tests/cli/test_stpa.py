@@ -21,7 +21,7 @@ def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
         "the contexts cover everything exactly once: proved in 9 cells",
         "unsafe control actions (15)",
         "vision_output/camera_unavailable",
-        "none: Drivers are not simulated",
+        "none: A driver is a defence",
         "control structure: structure.svg",
         "all well: 23 causal factors, 27 fault specs",
     ):
