@@ -49,6 +49,7 @@ WORKED_THROUGH = [
     TUTORIAL.with_name("tour-safety-engineer.md"),
     TUTORIAL.with_name("tour-controller-developer.md"),
     TUTORIAL.with_name("tour-researcher.md"),
+    TUTORIAL.with_name("sensor-requirement.md"),
     COMPARISON,
     HOW_TO / "inject-into-messages.md",
     *sorted(set(HOW_TO.glob("add-a-*.md")) - {HOW_TO / "add-a-study.md"}),  # test_studies runs its code
