@@ -36,7 +36,7 @@ from mutator.store.checksummed_lines import LineWriter, read_segment
 from mutator.store.file_digests import FileDigest
 from mutator.store.packed_patches import PatchFolder, PatchWriter, rewrite_patch_file
 from mutator.store.plan_choices import Choices
-from mutator.store.records import RECORDS_SCHEMA
+from mutator.store.records import RECORDS_SCHEMA, record_as_json
 from mutator.store.run_folder import RunFolder
 from mutator.store.session_environments import SessionEnvironment
 from mutator.store.timings import TIMINGS_SCHEMA
@@ -269,7 +269,7 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         for experiment in plan.experiments:
             fields = became(experiment)
             if fields is not None:
-                lines.append(dataclasses.asdict(record(experiment.id, **unchanged | fields)))
+                lines.append(record_as_json(record(experiment.id, **unchanged | fields)))
         lines.close()
         return out
 

@@ -97,6 +97,7 @@ def test_each_key_is_needed_unless_it_is_optional(run: Path) -> None:
         "operators",
         "include",
         "bench",
+        "defences",
         "speed",
         "phrases",
         "scenarios",
