@@ -38,6 +38,7 @@ ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any
         "report/series/*.js",
     ),
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
+    f"report/{DEFENDED_FOLDER}/*",
     *(
         "exports/mcap/*.mcap",
         "exports/*-report.html",

@@ -15,6 +15,7 @@ from mutator.model import Outcome
 from mutator.report.report_builder import write_report
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
+from mutator.store.run_deletion import delete_run
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -311,3 +312,10 @@ def test_a_killed_command_is_resumed_in_its_set(places: tuple[Workspace, Path], 
     command.kill()
     assert "hazard" in Command(places[0], run, *words).end()
     assert results_of_all(run) == results_of_all(places[1])
+
+
+def test_a_run_is_deleted_with_its_sets(places: tuple[Workspace, Path], tmp_path: Path) -> None:
+    """Nothing is left of the folder, and no file of a set is a stranger's."""
+    run = shutil.copytree(places[1], tmp_path / "run")
+    delete_run(run)
+    assert not run.exists()

@@ -96,9 +96,11 @@ def test_engines_agree(run: Path, workspace: Workspace, tmp_path: Path) -> None:
 
 
 def own_lines(folder: Path, suffix: str) -> Counter[str]:
-    """Return the lines for a first campaign. The campaign `operators` of an example is a second one."""
-    paths = (path for path in folder.rglob(f"*{suffix}") if path.name != "operators.yaml")
-    return counted("\n".join(path.read_text() for path in sorted(paths)))
+    """Return the lines for a first campaign. The campaigns `operators` and `defended` are further ones."""
+    further = ("operators.yaml", "defended.yaml")
+    paths = (p for p in folder.rglob(f"*{suffix}") if p.name not in further and p.parent.name != "defences")
+    text = "\n".join(path.read_text() for path in sorted(paths))
+    return counted(re.sub(r"(?m)^actuation:.*\n(?:[ #].*\n)+", "", text))
 
 
 def scene_lines(folder: Path) -> Counter[str]:
@@ -130,3 +132,15 @@ def test_the_extra_has_what_the_examples_need() -> None:
     for package in ("gymnasium", "highway-env", "opendbc", "simple-pid"):
         assert f'"{package}>=' in line
     assert sys.version_info < (3, 13) or "python_version < '3.13'" in line
+
+
+def test_defences_need_only_yaml(workspace: Workspace, tmp_path: Path) -> None:
+    """Each set runs the plan with its own golden runs, the audit passes, and a defence acts in some run."""
+    run = tmp_path / "run"
+    choices = mutator.Choices(limit=12)
+    summary = run_campaign(workspace, "defended", run, workers=2, choices=choices)
+    assert summary.exit_code == 0
+    assert len(summary.defended) == 3
+    records = [RunFolder.open(run / "defended" / name).records() for name in summary.defended]
+    assert any(record.defences for of_set in records for record in of_set.values())
+    assert mutator.verify(run, workspace=workspace).passed
