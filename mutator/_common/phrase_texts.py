@@ -62,5 +62,10 @@ def planned_number_text(number: float, unit: str = "") -> str:
     return with_unit(text, unit)
 
 
+def rounded_number_text(number: float) -> str:
+    """Return a number with four digits if it has a fraction: `2.076` for 2.0760537599999997."""
+    return planned_number_text(number if float(number).is_integer() else float(f"{number:.4g}"))
+
+
 def with_unit(text: str, unit: str) -> str:
     return text if unit in ("", "-") else f"{text} {unit}"

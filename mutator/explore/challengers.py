@@ -12,6 +12,7 @@ CHALLENGED_MODEL = "offset"  # the fault model whose error has a size with a sig
 _CHALLENGING_MODEL = "waveform"
 _HALF_PERIODS_S = (0.05, 0.16, 0.5, 1.6, 5.0)
 _GLITCH_PERIOD_S, _GLITCH_STEPS = 0.5, 2
+_SHAPE_PARAMS = ("shape", "period", "width")
 _SEED_MARK = "seed_"
 _MOST_SEED = 2**53  # every integer up to this is exact as a double
 
@@ -107,8 +108,8 @@ def challenging_fault(fault: Fault, name: str, *, duration_s: float, step_s: flo
     return replace(fault, spec=name_with_form(fault.spec, name), injections=tuple(injections))
 
 
-def has_expected_shape(fault: Fault) -> bool:
-    """Whether a fault injects what its name says, if that is the name of a challenger."""
+def has_expected_shape(fault: Fault, duration_s: float, step_s: float) -> bool:
+    """Whether a fault of this duration injects what its name says, if that is the name of a challenger."""
     _, mark, form = fault.spec.partition(FORM_MARK)
     if not mark or not is_challenger(form):
         return True
@@ -116,11 +117,11 @@ def has_expected_shape(fault: Fault) -> bool:
         challenger = challenger_of(form)
     except MutatorError:
         return False
+    expected = _shape_params(challenger, duration_s=duration_s, step_s=step_s)
     params = [dict(injection.params) for injection in fault.injections]
-    shapes = {(values.get("shape"), values.get("period")) for values in params}
-    if challenger.shape == "ramp":  # its period is that of the fault
-        return {shape for shape, _ in shapes} == {"ramp"}
-    return shapes == {(challenger.shape, challenger.period_s)}
+    return bool(params) and all(
+        {name: values[name] for name in _SHAPE_PARAMS if name in values} == expected for values in params
+    )
 
 
 def _challenging_injection(
@@ -131,11 +132,17 @@ def _challenging_injection(
             f"a challenger of the fault model {injection.model}",
             expected=f"faults of the model {CHALLENGED_MODEL}, whose error has a size with a sign",
         )
-    params: dict[str, Value] = {**dict(injection.params), "shape": challenger.shape, "seed": seed}
+    shape = _shape_params(challenger, duration_s=duration_s, step_s=step_s)
+    params: dict[str, Value] = {**dict(injection.params), **shape, "seed": seed}
+    return replace(injection, model=_CHALLENGING_MODEL, params=tuple(sorted(params.items())))
+
+
+def _shape_params(challenger: Challenger, *, duration_s: float, step_s: float) -> dict[str, Value]:
+    params: dict[str, Value] = {"shape": challenger.shape}
     if challenger.shape == "ramp":
         params["period"] = duration_s
     elif challenger.period_s is not None:
         params["period"] = challenger.period_s
     if challenger.shape == "pulses":
         params["width"] = round(_GLITCH_STEPS * step_s, 9)
-    return replace(injection, model=_CHALLENGING_MODEL, params=tuple(sorted(params.items())))
+    return params

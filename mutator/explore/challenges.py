@@ -41,8 +41,8 @@ class Bound:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChallengedBound:
     """What is left of a bound: the number of the largest magnitude, or longest duration, that was driven and
-    survived all challengers; None if none did. If it is lowered, `challenger` is not survived at `failed`,
-    as `result` shows.
+    survived all challengers, as did all smaller and shorter ones that were driven; None if none did. If it is
+    lowered, `challenger` is not survived at `failed`, as `result` shows.
     """
 
     bound: Bound
@@ -120,10 +120,15 @@ class Challenges:
         failed_levels = [n for n, failed in has_failed.items() if failed and (level is None or n > level)]
         if not failed_levels:
             return ChallengedBound(bound=bound, level=level, is_complete=not missing)
-        cell = bound.cell_at(min(failed_levels))
-        name, result = min(self._failures(cell), key=lambda f: f[1].state is not CellState.HAZARDOUS)
+        failures = self._failures(bound, min(failed_levels))
+        cell, name = min(failures, key=lambda key: self.results[key].state is not CellState.HAZARDOUS)
         return ChallengedBound(
-            bound=bound, level=level, is_complete=not missing, challenger=name, failed=cell, result=result
+            bound=bound,
+            level=level,
+            is_complete=not missing,
+            challenger=name,
+            failed=cell,
+            result=self.results[cell, name],
         )
 
     def _descent(self, bound: Bound) -> tuple[Mapping[int, bool], list[ChallengedCell]]:
@@ -131,11 +136,11 @@ class Challenges:
         has_failed: dict[int, bool] = {}
         while (level := next_level(has_failed, bound.top)) is not None:
             cell, above = bound.cell_at(level), [n for n, failed in has_failed.items() if failed]
-            if self._failures(cell):
+            if self._failures(bound, level):
                 has_failed[level] = True
                 continue
             # what failed before is driven first: the others are needless if it fails here, too
-            suspects = [name for name, _ in self._failures(bound.cell_at(min(above)))] if above else []
+            suspects = [name for _, name in self._failures(bound, min(above))] if above else []
             suspects = [name for name in self._names_at(cell) if name in suspects]
             for names in (suspects, self._names_at(cell)):
                 if missing := [(cell, name) for name in names if (cell, name) not in self.results]:
@@ -143,10 +148,19 @@ class Challenges:
             has_failed[level] = False
         return has_failed, []
 
-    def _failures(self, cell: Cell) -> list[tuple[str, CellResult]]:
-        """Return the challengers that were driven in a cell and not survived, each with its result."""
-        results = ((name, self.results.get((cell, name))) for name in self._names_at(cell))
-        return [(name, r) for name, r in results if r and r.state is not CellState.WITHOUT_HAZARD]
+    def _failures(self, bound: Bound, level: int) -> list[ChallengedCell]:
+        """Return the challengers that were driven and not survived, of those that a bound at this level calls
+        survived: also smaller and shorter ones, which were driven for other bounds.
+        """
+        line, duration = bound.cell_at(level)
+        failures = (
+            ((i, j), name)
+            for ((i, j), name), result in self.results.items()
+            if result.state is not CellState.WITHOUT_HAZARD
+            and j <= duration
+            and (i == line or (i < line and not bound.is_duration))
+        )
+        return sorted(failures, key=lambda failure: (failure[0], self.names.index(failure[1])))
 
     def _names_at(self, cell: Cell) -> list[str]:
         duration_s = self.lattice.durations_s[cell[1]]

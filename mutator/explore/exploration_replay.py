@@ -86,7 +86,7 @@ def replay_exploration(folder: RunFolder, manifest: TargetManifest) -> Explorati
     if campaign.exploration is None:
         raise MutatorError("no exploration", where=campaign.path, expected="a bench with the key `explore`")
     _check_lattices(campaign.exploration, campaign.path)
-    plan = _ExploredPlan(folder, campaign.after_hazard)
+    plan = _ExploredPlan(folder, campaign.after_hazard, manifest.step_s)
     drives = _drives_of_planes(manifest, campaign.exploration, plan)
     proposer = FindingSearch if campaign.exploration.goal == "find" else Exploration
     exploration = proposer(section=campaign.exploration, drives=drives, seed=campaign.seed)
@@ -121,13 +121,13 @@ def _check_lattices(section: ExplorationSection, path: Path) -> None:
 class _ExploredPlan:
     """The plan of a run folder: experiments by what their cells say, and batches."""
 
-    def __init__(self, folder: RunFolder, after_hazard: AfterHazard) -> None:
+    def __init__(self, folder: RunFolder, after_hazard: AfterHazard, step_s: float) -> None:
         self.folder = folder
         self.ids: list[str] = []
         self.keys: list[_CellKey] = []
         self.golden_by_key: dict[_GoldenKey, GoldenRun] = {}
         for experiment in plan_file.iterate_experiments(folder.path):
-            key = _key_of_experiment(experiment, after_hazard)
+            key = _key_of_experiment(experiment, after_hazard, step_s)
             self.ids.append(experiment.id)
             self.keys.append(key)
             self.golden_by_key.setdefault((key[0], key[2], key[5]), folder.golden_run_of(experiment))
@@ -222,10 +222,11 @@ class _ReplayedPlan:
         )
 
 
-def _key_of_experiment(experiment: Experiment, after_hazard: AfterHazard) -> _CellKey:
+def _key_of_experiment(experiment: Experiment, after_hazard: AfterHazard, step_s: float) -> _CellKey:
     trigger = experiment.trigger
     is_from_time_on = trigger.hold is Hold.FOR and trigger.armed_after_s == 0.0 and not experiment.setting
-    is_from_time_on &= experiment.after_hazard is after_hazard and has_expected_shape(experiment.fault)
+    is_from_time_on &= experiment.after_hazard is after_hazard
+    is_from_time_on &= has_expected_shape(experiment.fault, trigger.hold_s or 0.0, step_s)
     return (
         experiment.fault.spec,
         experiment.fault.value,

@@ -10,6 +10,7 @@ from mutator._common.phrase_texts import (
     fill_phrase,
     holes_of,
     planned_number_text,
+    rounded_number_text,
 )
 from mutator.config.units import split_key_at_unit
 from mutator.model import Fault, Injection, Value
@@ -62,7 +63,10 @@ def _injection_texts(injection: Injection) -> dict[str, str]:
         FILE_HOLE: location.path,
     }
     for name, value in params.items():
-        texts |= {name: "None"} if value is None else _value_texts(name, value, "")
+        if isinstance(value, float):  # often converted from another unit
+            texts |= _number_texts(name, rounded_number_text(value), rounded_number_text(abs(value)))
+        else:
+            texts |= {name: "None"} if value is None else _value_texts(name, value, "")
     return texts
 
 

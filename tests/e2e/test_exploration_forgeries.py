@@ -332,6 +332,23 @@ def a_challenger_of_another_shape(run: Path) -> None:
     replace_in_batch(run, *challenger_of(run), forged)
 
 
+def a_ramp_that_hardly_grows(run: Path) -> None:
+    def forged(experiment: Experiment) -> Experiment:
+        [injection] = experiment.fault.injections
+        params = tuple(sorted({**dict(injection.params), "period": 1e6}.items()))
+        fault = replace(experiment.fault, injections=(replace(injection, params=params),))
+        return replace(experiment, fault=fault)
+
+    batches = batches_of(run)
+    ramps = [
+        (n, i)
+        for n, batch in enumerate(batches)
+        for i, e in enumerate(batch)
+        if e.fault.spec.endswith("~ramp")
+    ]
+    replace_in_batch(run, *ramps[0], forged)
+
+
 def a_dropped_challenger(run: Path) -> None:
     batches = batches_of(run)
     batch, number = challenger_of(run)
@@ -390,6 +407,7 @@ FORGERIES = (
     a_challenger_made_hazardous,
     another_challenger,
     a_challenger_of_another_shape,
+    a_ramp_that_hardly_grows,
     a_dropped_challenger,
     the_challengers,
     a_challenged_bound,

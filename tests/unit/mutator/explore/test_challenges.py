@@ -85,6 +85,24 @@ def test_the_longest_duration_of_the_largest_magnitude_is_challenged() -> None:
     assert envelope.durations_s[longest.level] < 0.1 <= envelope.durations_s[longest.level + 1]
 
 
+def test_a_shorter_challenger_lowers_every_bound_that_includes_it() -> None:
+    """Noise of 1 m and more ends badly if it lasts for a second at most: nothing larger is survived for every
+    duration, nor for all up to 1 and 2 s.
+    """
+    envelope = challenged(lambda name, m, d: not (name == "noise" and m >= 1.0 and d <= 1.0))
+    assert envelope.exploration.is_complete
+    bounds = [c for c in envelope.challenges if not c.bound.is_duration]
+    assert len(bounds) == 4 and len({c.level for c in bounds}) == 1
+    for challenge in bounds:
+        assert challenge.level is not None and challenge.is_lowered and challenge.challenger == "noise"
+        assert (
+            (envelope.magnitudes[challenge.level] or 0)
+            < 1.0
+            <= (envelope.magnitudes[challenge.level + 1] or 0)
+        )
+        assert challenge.failed and envelope.durations_s[challenge.failed[1]] <= 1.0
+
+
 def test_what_has_no_result_has_not_survived() -> None:
     """A challenger that crashes, or is not decided, lowers a bound, too, and says why."""
     envelope = envelope_of(
@@ -163,10 +181,24 @@ def test_a_challenger_has_size_place_and_bounds_of_the_constant_error(
     assert isinstance(params.pop("seed"), int)
     assert params == {"by": -2.0, "low": 0.0, "target": "speed", **expected}
     assert injection.location == fault.injections[0].location and injection.model == "waveform"
-    assert has_expected_shape(challenger) and has_expected_shape(fault)
-    assert not has_expected_shape(replace(challenger, injections=fault.injections))
+    assert has_expected_shape(challenger, 4.0, 0.01) and has_expected_shape(fault, 4.0, 0.01)
+    assert not has_expected_shape(replace(challenger, injections=fault.injections), 4.0, 0.01)
     other = challenging_fault(fault, name, duration_s=4.0, step_s=0.01, seed=2)
     assert challenger.id != fault.id != other.id
+
+
+@pytest.mark.parametrize(
+    ("name", "weaker"), [("ramp", {"period": 1e6}), ("glitch", {"width": 1e-6}), ("noise", {"shape": "ramp"})]
+)
+def test_a_weaker_error_is_not_the_challenger_that_its_name_says(
+    name: str, weaker: dict[str, object]
+) -> None:
+    """A ramp that hardly grows, or a glitch shorter than a step, would survive anything."""
+    challenger = challenging_fault(offset_fault(), name, duration_s=4.0, step_s=0.01, seed=1)
+    [injection] = challenger.injections
+    params = tuple(sorted({**dict(injection.params), **weaker}.items()))
+    forged = replace(challenger, injections=(replace(injection, params=params),))
+    assert not has_expected_shape(forged, 4.0, 0.01)
 
 
 def test_only_a_constant_error_is_challenged() -> None:

@@ -11,6 +11,7 @@ from mutator.campaigns.phrase_collection import (
     phrases_of_variants,
 )
 from mutator.errors import MutatorError
+from mutator.explore.challengers import challenging_fault
 from mutator.faults.injection_parameters import resolve_injection
 from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
@@ -66,6 +67,28 @@ def test_every_shipped_fault_model_describes_its_examples(clone: Workspace) -> N
             )  # fmt: skip
             text = describe_fault(fault, phrases)
             assert text != fault.label and not set("{}") & set(text.replace("{}", "")), model.name
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        ("alternating_0.5s", "alternating, with a period of 1 s"),
+        ("ramp", "ramp, with a period of 4 s"),
+        ("glitch", "pulses of 0.02 s every 0.5 s"),
+        ("noise", "noise"),
+    ],
+)
+def test_a_challenger_is_described_by_its_shape_and_a_rounded_size(
+    clone: Workspace, name: str, shape: str
+) -> None:
+    """Its error was converted from mph, and is shown with four digits."""
+    fault = next(f for f in clone.faults("car_sensors/speed/slower") if f.value == 60)
+    [injection] = fault.injections
+    params = tuple(sorted({**dict(injection.params), "by": -2.0760537599999997}.items()))
+    fault = replace(fault, injections=(replace(injection, params=params),))
+    challenger = challenging_fault(fault, name, duration_s=4.0, step_s=0.01, seed=1)
+    text = describe_fault(challenger, phrases_of_fault(clone, clone.manifest("openpilot"), challenger))
+    assert text.startswith(f"an error of -2.076 ({shape}) is added to `")
 
 
 def test_an_unknown_hole_of_a_spec_is_an_error_with_the_holes_that_exist(toy: Workspace) -> None:
