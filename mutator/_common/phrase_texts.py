@@ -10,6 +10,7 @@ CHANGED_HOLE, FUNCTION_HOLE, FILE_HOLE = "changed", "function", "file"  # in phr
 _HOLE_PATTERN = re.compile(r"\{([^{}]*)\}")
 _LEAST_SHOWN_AS_WHOLE_NUMBER = 100.0  # from here on, converted numbers have no decimals
 _LEAST_WITH_HUNDREDTHS = 0.1
+_WHOLE_FROM = 1000.0  # rounded numbers of this size have four digits without a fraction
 _ROUNDING = 1e-9  # numbers below this are 0
 _LARGEST_EXACT = 1e15
 
@@ -63,8 +64,8 @@ def planned_number_text(number: float, unit: str = "") -> str:
 
 
 def rounded_number_text(number: float) -> str:
-    """Return a number with four digits if it has a fraction: `2.076` for 2.0760537599999997."""
-    return planned_number_text(number if float(number).is_integer() else float(f"{number:.4g}"))
+    """Return a number with four digits, `2.076` for 2.0760537599999997; from 1000 on, as a whole number."""
+    return planned_number_text(float(f"{number:.0f}" if abs(number) >= _WHOLE_FROM else f"{number:.4g}"))
 
 
 def with_unit(text: str, unit: str) -> str:

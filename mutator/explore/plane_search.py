@@ -164,7 +164,12 @@ class PlaneSearch:
         return max(LEAST_SWEPT_DURATIONS, _CELLS_TO_SWEEP // line_count)
 
     def _bisections(self, line: int) -> list[Cell]:
-        return [self._middle(line, before, after) for before, after in self.plane.open_pairs(line)]
+        """Return cells between decided ones that differ; then the shortest one, if the first decided one is
+        hazardous: nothing says yet that shorter faults are.
+        """
+        cells = [self._middle(line, before, after) for before, after in self.plane.open_pairs(line)]
+        begins_hazardous = any(is_hazardous for _, is_hazardous in self.plane.decided(line)[:1])
+        return cells or (self._undriven([(line, 0)]) if begins_hazardous else [])
 
     def _middle(self, line: int, before: int, after: int) -> Cell:
         """Return the undriven cell next to the middle."""

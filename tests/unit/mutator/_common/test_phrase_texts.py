@@ -8,6 +8,7 @@ from mutator._common.phrase_texts import (
     measured_number_text,
     measured_time_text,
     planned_number_text,
+    rounded_number_text,
 )
 
 
@@ -61,3 +62,8 @@ def test_the_first_text_whose_holes_have_values_is_used() -> None:
 )
 def test_a_time_has_the_hundredths_of_tables(seconds: float, text: str) -> None:
     assert measured_time_text(seconds) == text
+
+
+def test_a_rounded_number_has_four_digits_or_no_fraction() -> None:
+    numbers = (-2.0760537599999997, 57.29577951308232, 12345.678, 100.0, 0.05, float("inf"))
+    assert [*map(rounded_number_text, numbers)] == ["-2.076", "57.3", "12346", "100", "0.05", "inf"]

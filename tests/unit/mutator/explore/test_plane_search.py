@@ -1,5 +1,6 @@
 """The search of a plane, on made-up planes."""
 
+import math
 from itertools import product
 
 import pytest
@@ -100,3 +101,20 @@ def test_proposals_depend_on_the_results_alone() -> None:
             again.add(cell, result)
         proposals.append(PlaneSearch(plane=again, decidable=len(DURATIONS)).proposals())
     assert proposals[0] == proposals[1] != []
+
+
+def test_shorter_faults_than_the_driven_ones_are_not_called_hazardous() -> None:
+    """A band of hazardous durations that widens and narrows with the magnitude: lines between two searched
+    ones can begin with a hazard, but their shortest fault has none.
+    """
+
+    def band(magnitude: float, duration_s: float) -> float | None:
+        size = math.log(magnitude / 3.0)
+        first_s = 0.3 * math.exp(0.6 * size)
+        last_s = first_s * math.exp(1.5 * (1.0 + 0.7 * math.sin(2.0 * size)))
+        is_hazardous = magnitude >= 3.0 and first_s <= duration_s <= last_s
+        return duration_s + 1.0 if is_hazardous else None
+
+    cells = called(search(band))
+    assert any(state is CellState.HAZARDOUS for line in cells for state in line)
+    assert not any(line[0].is_hazardous for line in cells)
