@@ -37,7 +37,7 @@ def load_activities(
         report = parse_json(read_bounded(path, MOST_JSON_BYTES))
     except (OSError, ValueError):
         raise BadOutput("the run left no report of its defences", where=path) from None
-    if not isinstance(report, dict) or [*report] != [*defences]:
+    if not isinstance(report, dict) or report.keys() != {*defences}:
         raise _damage_error(path)
     activities = (_activity(name, entry, commands, path) for name, entry in report.items())
     return tuple(activity for activity in activities if activity)

@@ -18,7 +18,6 @@ from mutator.statistics.statistics_sheet import Sheet
 from mutator.store.allowed_contents import DEFENDED_FOLDER
 from mutator.targets.overhead_view_json import scene_as_json
 
-_MOST_CAUSED = 10  # pairs that the panel lists; the table has all
 _SHEETS_SHOWN = (
     *("defences", "defence_rates", "defended_hazards", "defended_severity", "defence_authority"),
     "defences_without_faults",
@@ -105,17 +104,22 @@ def _sentences(sets: Sequence[DefendedSet]) -> Iterable[str]:
     count_by_name = {
         name: sum(pair.outcome is PairOutcome.PREVENTED for pair in pairs) for name, pairs in worst.items()
     }
-    best = max(sets, key=lambda defended: count_by_name[defended.name])
-    of = len(worst[best.name])
+    best = max(
+        sets, key=lambda defended: (count_by_name[defended.name], prevented_share(defended.pairs).count)
+    )
+    of, prevented = len(worst[best.name]), prevented_share(best.pairs)
     if not of:
         yield "No undefended run has a hazard, so there was nothing to prevent."
-    elif not count_by_name[best.name]:
-        yield f"No set prevents any of the {of} worst {what}."
+    elif not prevented.count:
+        yield "No set prevents any hazard."
     else:
         yield (
             f"`{best.name}` prevents most of the worst: {count_by_name[best.name]} of {of} {what}, and "
-            f"{prevented_share(best.pairs)} of all hazards."
-        )
+            f"{prevented} of all hazards."
+            if count_by_name[best.name]
+            else f"No set prevents any of the {of} worst {what}. Of all hazards, `{best.name}` prevents "
+            f"most: {prevented}."
+        ) + _open_text(best)
         yield _cost_sentence(best)
     for defended in sets:
         if defended.caused_goldens:
@@ -142,17 +146,28 @@ def _cost_sentence(defended: DefendedSet) -> str:
     )
 
 
+def _open_text(defended: DefendedSet) -> str:
+    count = defended.count_by_outcome[PairOutcome.OPEN]
+    return f" In {count} more, no hazard came, but the drive ends too early to say more." if count else ""
+
+
 def _caused_sentence(sets: Sequence[DefendedSet]) -> str:
-    caused = [(defended.name, pair) for defended in sets for pair in defended.select(PairOutcome.CAUSED)]
-    if not caused:
+    """Say how many hazards each set caused, with the worst of each."""
+    caused = {defended.name: defended.select(PairOutcome.CAUSED) for defended in sets}
+    parts = [_caused_text(name, pairs) for name, pairs in caused.items() if pairs]
+    if not parts:
         return "No set caused a hazard in an experiment that had none."
-    listed = "; ".join(
-        f"{pair.undefended.fault} in {pair.undefended.scenario_label} with `{name}` "
-        f"({', '.join(hazard for hazard, _ in pair.defended.hazards)}, `{pair.undefended.experiment_id}`)"
-        for name, pair in caused[:_MOST_CAUSED]
+    listed = "; ".join(parts)
+    return f"Hazards in experiments that had none: {listed}. All are in `tables/defended_pairs.csv`."
+
+
+def _caused_text(name: str, pairs: Sequence[DefendedPair]) -> str:
+    worst = pairs[0]
+    hazards = ", ".join(hazard for hazard, _ in worst.defended.hazards)
+    return (
+        f"`{name}` caused {len(pairs)}, the worst of them {hazards} with {worst.undefended.fault} in "
+        f"{worst.undefended.scenario_label} (`{worst.undefended.experiment_id}`)"
     )
-    more = "" if len(caused) <= _MOST_CAUSED else "; all are in `tables/defended_pairs.csv`"
-    return f"Defences caused a hazard in {counted(len(caused), 'experiment')} that had none: {listed}{more}."
 
 
 def _summary(sets: Sequence[DefendedSet]) -> TextTable:
