@@ -54,6 +54,7 @@ class CellResult:
     * `margins`: the smallest distance from each hazard that has a margin, by metric
     * `reason`: why the cell is not decided, or how the controller ended
     * `is_activated`: whether the injected code ran while the fault was active
+    * `is_judged`: whether the run went on to its end, so that no hazard in it means that there was none
     """
 
     state: CellState
@@ -64,6 +65,7 @@ class CellResult:
     margins: Mapping[str, float] = field(default_factory=dict)
     reason: str = ""
     is_activated: bool = True
+    is_judged: bool = True
 
 
 def judge_cell(record: Record, duration_s: float, drive: Drive, observe_s: float) -> CellResult:
@@ -76,10 +78,10 @@ def judge_cell(record: Record, duration_s: float, drive: Drive, observe_s: float
     name = record.experiment_id
     if record.status is Status.CRASHED:
         reason = record.detail or "the controller crashed"
-        return CellResult(state=CellState.DISENGAGED, experiment_id=name, reason=reason)
+        return CellResult(state=CellState.DISENGAGED, experiment_id=name, reason=reason, is_judged=False)
     if record.status is not Status.OK or record.outcome is Outcome.NOT_JUDGED:
         reason = record.detail or f"the run ended as {record.status}"
-        return CellResult(state=CellState.NOT_DECIDED, experiment_id=name, reason=reason)
+        return CellResult(state=CellState.NOT_DECIDED, experiment_id=name, reason=reason, is_judged=False)
     if record.outcome is Outcome.HAZARD:
         hazard, time = record.hazards[0]
         return _hazardous_cell(name, hazard, time - drive.start_s, duration_s, drive.step_s, margins)

@@ -150,7 +150,7 @@ class Challenges:
 
     def _failures(self, bound: Bound, level: int) -> list[ChallengedCell]:
         """Return the challengers that were driven and not survived, of those that a bound at this level calls
-        survived: also smaller and shorter ones, which were driven for other bounds.
+        survived, the smallest and then longest first: also shorter ones, which were driven for other bounds.
         """
         line, duration = bound.cell_at(level)
         failures = (
@@ -160,7 +160,7 @@ class Challenges:
             and j <= duration
             and (i == line or (i < line and not bound.is_duration))
         )
-        return sorted(failures, key=lambda failure: (failure[0], self.names.index(failure[1])))
+        return sorted(failures, key=lambda key: (key[0][0], -key[0][1], self.names.index(key[1])))
 
     def _names_at(self, cell: Cell) -> list[str]:
         duration_s = self.lattice.durations_s[cell[1]]

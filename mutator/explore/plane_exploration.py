@@ -182,7 +182,7 @@ def result_of_all_seeds(results: Mapping[str, CellResult]) -> CellResult:
     for state in (CellState.HAZARDOUS, CellState.NOT_DECIDED, CellState.DISENGAGED):
         for result in ordered:
             if result.state is state:
-                return result
+                return replace(result, is_judged=all(r.is_judged for r in ordered))
     first = ordered[0].margins
     margins = {name: min(r.margins.get(name, value) for r in ordered) for name, value in first.items()}
     return replace(ordered[0], margins=margins, is_activated=any(r.is_activated for r in ordered))

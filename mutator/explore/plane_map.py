@@ -82,7 +82,7 @@ class PlaneMap:
         first, proof = self.inferring[line]
         for duration in range(first, len(self.lattice.durations_s)):
             result = self.results.get((line, duration))
-            if result and result.state is CellState.WITHOUT_HAZARD:
+            if result and result.is_judged and result.state is not CellState.HAZARDOUS:
                 raise MutatorError(
                     f"experiment {result.experiment_id} has no hazard, but the shorter fault of experiment "
                     f"{proof.experiment_id} reached {proof.hazard} while it was active",

@@ -63,7 +63,9 @@ def envelope_of(
             result = result_of(truth, lattice, cell)
             if crashes(magnitude, duration_s):
                 reason = "ValueError: no lead"
-                result = CellResult(state=without_result, experiment_id=str(cell), reason=reason)
+                result = CellResult(
+                    state=without_result, experiment_id=str(cell), reason=reason, is_judged=False
+                )
             if is_challenger(form):
                 result = _challenger_result(
                     challengers(form, magnitude, duration_s), cell, form, challenger_state
