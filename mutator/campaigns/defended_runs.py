@@ -43,6 +43,8 @@ def defended_run_path(run: Path, names: tuple[str, ...]) -> Path:
 def list_defended_runs(run: Path) -> list[Path]:
     """Return the run folders of sets of defences in a run folder, by name; UnsafePath for a link."""
     folder = run / DEFENDED_FOLDER
+    if folder.is_symlink():
+        raise not_plain_error(folder)
     if not folder.is_dir():
         return []
     with os.scandir(folder) as entries:
@@ -87,7 +89,16 @@ def freeze_defended_runs(
 
 
 def plan_problems(folder: RunFolder, undefended: RunFolder) -> Iterator[MutatorError]:
-    """Yield how the plan of a defended run differs from that of the undefended run."""
+    """Yield how the plan of a defended run differs from that of the undefended run, and whether its defences
+    are those of its folder's name.
+    """
+    if (name := set_name(tuple(defence.name for defence in folder.head.defences))) != folder.path.name:
+        yield MutatorError(
+            f"the defences {name or 'none'}",
+            where=folder.path / HEAD,
+            expected=f"{folder.path.name}, as the folder's name",
+            remedy="restore the folder's name, or delete the folder and run the campaign again",
+        )
     for key in ("plan", "campaign_digest", "limits", "seed", "reading"):
         value, expected = (getattr(run.head, key) for run in (folder, undefended))
         if value != expected:

@@ -63,7 +63,9 @@ class DefendedRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefendedPair:
-    """An experiment without and with a set of defences."""
+    """An experiment without and with a set of defences. The hazards of `defended` are also those that its
+    defences cause without a fault.
+    """
 
     undefended: ResultRow
     defended: ResultRow
@@ -73,7 +75,7 @@ class DefendedPair:
     @property
     def is_unneeded_activation(self) -> bool:
         """Whether a defence acted although the undefended run has no hazard."""
-        return bool(self.facts.acted) and _is_complete(self.undefended) and not self.undefended.hazards
+        return bool(self.facts.acted) and self.outcome in (PairOutcome.NO_HAZARD, PairOutcome.CAUSED)
 
 
 def pair_of(undefended: ResultRow, defended: ResultRow, facts: DefendedRow, observe_s: float) -> DefendedPair:
@@ -103,7 +105,10 @@ def _outcome_of(
 
 
 def _is_complete(row: ResultRow) -> bool:
-    return row.usable and row.status is Status.OK
+    """Whether the run went to its end. One that was not judged, because its golden run has a hazard before
+    the fault, is compared by the hazards that the defences cause.
+    """
+    return row.status is Status.OK and (row.usable or bool(row.hazards))
 
 
 def _is_over(facts: DefendedRow, observe_s: float) -> bool:

@@ -2,12 +2,12 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
 from mutator.campaigns.bench_files import load_campaign_of_run
-from mutator.campaigns.defended_runs import list_defended_runs
+from mutator.campaigns.defended_runs import list_defended_runs, plan_problems
 from mutator.comparison.compared_runs import ComparedRun, load_compared_run
 from mutator.comparison.defended_pairs import (
     DefendedPair,
@@ -17,12 +17,13 @@ from mutator.comparison.defended_pairs import (
     pair_of,
 )
 from mutator.defences.defence_facts import DefenceFacts, set_name
-from mutator.model import DefenceActivity
+from mutator.model import DefenceActivity, Outcome, Status
 from mutator.outcomes.defence_reports import load_activities
 from mutator.results.columns_of_defences import AUTHORITY_PREFIX
 from mutator.results.result_rows import ResultRow, cells_by_row
 from mutator.results.table_building import PARQUET_FILE
 from mutator.results.table_reader import Results
+from mutator.store.golden_runs import GoldenRun
 from mutator.store.run_folder import RunFolder
 
 
@@ -45,7 +46,8 @@ class DefendedSet:
     """A set of defences with its pairs, in the order of the plan.
 
     `golden_activities`: what its defences did without a fault; `caused_goldens`: the golden runs in which
-    they cause a hazard.
+    they cause a hazard; `missing_count`: the undefended results that have no pair, because the set is not
+    finished.
     """
 
     name: str
@@ -54,6 +56,17 @@ class DefendedSet:
     pairs: tuple[DefendedPair, ...]
     golden_activities: tuple[GoldenActivity, ...]
     caused_goldens: tuple[str, ...]
+    missing_count: int = 0
+
+    @property
+    def false_goldens(self) -> tuple[str, ...]:
+        """The golden runs in which a defence acts, although the undefended one has no hazard."""
+        return tuple(dict.fromkeys(a.golden for a in self.golden_activities if a.is_false))
+
+    @property
+    def lost_count(self) -> int:
+        """The number of undefended hazards whose run with defences has no result that can be compared."""
+        return sum(bool(pair.undefended.hazards) for pair in self.select(PairOutcome.NOT_COMPARED))
 
     @property
     def count_by_outcome(self) -> "Counter[PairOutcome]":
@@ -68,7 +81,8 @@ class DefendedSet:
 def load_defended_sets(run: RunFolder) -> tuple[DefendedSet, ...]:
     """Return the sets of a campaign whose runs have results, in the order of the campaign.
 
-    MutatorError as for a comparison: checks that did not pass, or a failed equivalence check.
+    MutatorError as for a comparison (checks that did not pass, or a failed equivalence check), and for a set
+    whose plan or defences are others.
     """
     paths = {path.name: path for path in list_defended_runs(run.path) if (path / PARQUET_FILE).is_file()}
     if not paths:
@@ -81,23 +95,57 @@ def load_defended_sets(run: RunFolder) -> tuple[DefendedSet, ...]:
 
 def _load_set(undefended: ComparedRun, path: Path, observe_s: float) -> DefendedSet:
     defended = load_compared_run(path)
+    for problem in plan_problems(defended.folder, undefended.folder):
+        raise problem
     frame = Results(path).frame()
     commands = command_by_authority_column([str(name) for name in frame.columns], AUTHORITY_PREFIX)
     facts = {cells["experiment_id"]: DefendedRow.of_cells(cells, commands) for cells in cells_by_row(frame)}
+    row_by_id = _rows_with_caused_hazards(undefended.folder, defended)
     pairs = tuple(
-        pair_of(undefended.row_by_id[e.id], defended.row_by_id[e.id], facts[e.id], observe_s)
+        pair_of(undefended.row_by_id[e.id], row_by_id[e.id], facts[e.id], observe_s)
         for e in undefended.experiments
         if e.id in undefended.row_by_id and e.id in facts
     )
-    hazards_before, hazards_after = undefended.folder.golden_hazards, defended.folder.golden_hazards
     return DefendedSet(
         name=path.name,
         folder=defended.folder,
         defences=defended.folder.head.defences,
         pairs=pairs,
         golden_activities=tuple(_golden_activities(undefended.folder, defended.folder)),
-        caused_goldens=tuple(sorted(hazards_after.keys() - hazards_before.keys())),
+        caused_goldens=tuple(_caused_goldens(undefended.folder, defended.folder)),
+        missing_count=len(undefended.row_by_id) - len(pairs),
     )
+
+
+def _rows_with_caused_hazards(undefended: RunFolder, defended: ComparedRun) -> dict[str, ResultRow]:
+    """Return the rows of a defended run with all hazards of the drive that the undefended golden run does not
+    have. Records count those of the defended golden run apart, because the fault did not cause them.
+    """
+    if not defended.folder.golden_hazards:
+        return defended.row_by_id
+    rows, records = dict(defended.row_by_id), defended.folder.records()
+    several_seeds = defended.folder.has_seeded_goldens
+    for experiment in defended.experiments:
+        row, record = rows.get(experiment.id), records.get(experiment.id)
+        if row is None or record is None or record.status is not Status.OK:
+            continue
+        key = GoldenRun.for_experiment(experiment, several_seeds=several_seeds).key
+        usual = _golden_hazards(undefended, key)
+        if usual and record.outcome is Outcome.NOT_JUDGED:
+            continue  # whose hazards these are is not known
+        # a fault that was never active leaves the drive as the golden run
+        is_golden = record.outcome is Outcome.NOT_ACTIVATED
+        others = defended.folder.golden_hazards.get(key, ()) if is_golden else record.golden_hazards
+        hazards = (*row.hazards, *((name, t) for name, t in others if name not in usual))
+        rows[experiment.id] = replace(row, hazards=tuple(sorted(hazards, key=lambda hazard: hazard[1])))
+    return rows
+
+
+def _caused_goldens(undefended: RunFolder, defended: RunFolder) -> Iterator[str]:
+    """Yield the golden runs that have a hazard with defences that they do not have without them."""
+    for key in sorted(defended.golden_hazards):
+        if {*_golden_hazards(defended, key)} - {*_golden_hazards(undefended, key)}:
+            yield key
 
 
 def _golden_activities(undefended: RunFolder, defended: RunFolder) -> Iterator[GoldenActivity]:

@@ -43,11 +43,13 @@ def _outcomes_sheet(sets: Iterable[DefendedSet]) -> Sheet:
         name="defences",
         title="What defences did with hazards",
         note="Experiments with a hazard in the undefended run, by what became of it with each set; `caused` "
-        "are those that had none. The interval of the prevented share resamples whole faults; there is none "
-        "if all agree. A sample's shares are those of its experiments, without weights.",
+        "are those that had none, `not compared` those whose run with defences crashed or has no result. "
+        "False activations are counted by fault-free drive. The interval of the prevented share resamples "
+        "whole faults; there is none if all agree. A sample's shares are those of its experiments, without "
+        "weights.",
         heads=(
             *("defences", "hazards", "prevented", *(outcome.value for outcome in _HAZARD_OUTCOMES[1:])),
-            *("caused", "false activations", "unneeded activations", "with conflicts"),
+            *("not compared", "caused", "false activations", "unneeded activations", "with conflicts"),
         ),
         lines=tuple(_outcome_line(defended) for defended in sets),
     )
@@ -60,8 +62,9 @@ def _outcome_line(defended: DefendedSet) -> tuple[SheetCell, ...]:
         sum(counts[outcome] for outcome in _HAZARD_OUTCOMES),
         prevented_share(defended.pairs),
         *(counts[outcome] for outcome in _HAZARD_OUTCOMES[1:]),
+        defended.lost_count,
         counts[PairOutcome.CAUSED],
-        sum(activity.is_false for activity in defended.golden_activities),
+        len(defended.false_goldens),
         sum(pair.is_unneeded_activation for pair in defended.pairs),
         sum(pair.facts.conflict_steps > 0 for pair in defended.pairs),
     )

@@ -29,8 +29,9 @@ def load_defence_activities(manifest: TargetManifest, out: Path) -> tuple[Defenc
 def load_activities(
     defences: Sequence[str], commands: Sequence[str], out: Path
 ) -> tuple[DefenceActivity, ...]:
-    """Return what each of these defences did that acted in the run whose output is in `out`. BadOutput if the
-    report is missing or damaged, or if one has changed another command than `commands`.
+    """Return what each of these defences did that acted in the run whose output is in `out`, in their order,
+    which need not be that of the report. BadOutput if the report is missing or damaged, or if one has
+    changed another command than `commands`.
     """
     path = path_below(out, DEFENCE_REPORT_FILE)
     try:
@@ -39,7 +40,7 @@ def load_activities(
         raise BadOutput("the run left no report of its defences", where=path) from None
     if not isinstance(report, dict) or report.keys() != {*defences}:
         raise _damage_error(path)
-    activities = (_activity(name, entry, commands, path) for name, entry in report.items())
+    activities = (_activity(name, report[name], commands, path) for name in defences)
     return tuple(activity for activity in activities if activity)
 
 

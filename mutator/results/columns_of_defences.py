@@ -34,14 +34,6 @@ def defence_columns(defences: Sequence[DefenceFacts]) -> tuple[ResultColumn, ...
     )
 
 
-def _count_column(name: str, about: str, key: str) -> ResultColumn:
-    def cell_of(finished: FinishedExperiment) -> int | None:
-        counts = [getattr(activity, key) for activity in finished.record.defences]
-        return sum(counts) if finished.is_ok else None
-
-    return ResultColumn(name, "count", "", about, cell_of)
-
-
 def _authority_column(command: str) -> ResultColumn:
     def cell_of(finished: FinishedExperiment) -> float | None:
         values = (
@@ -87,11 +79,21 @@ COLUMNS_OF_EVERY_DEFENCE = (
         "when a defence first acted",
         lambda f: rounded_time(min((a.first for a in f.record.defences), default=None)),
     ),
-    _count_column(ACTIVATIONS, "number of activations of the defences", "activations"),
-    _count_column(
+    ResultColumn(
+        ACTIVATIONS,
+        "count",
+        "",
+        "number of activations of the defences",
+        lambda f: sum(a.activations for a in f.record.defences) if f.is_ok else None,
+    ),
+    ResultColumn(
         CONFLICTS,
-        "number of steps in which a defence's range for a command and another one's did not overlap",
-        "conflicts",
+        "count",
+        "",
+        "number of steps in which a defence's range for a command and another one's did not overlap; of more "
+        "than two defences, the number of the one with the most",
+        # both defences count the step
+        lambda f: max((a.conflicts for a in f.record.defences), default=0) if f.is_ok else None,
     ),
     ResultColumn(
         AFTER_FAULT,

@@ -319,3 +319,31 @@ def test_a_run_is_deleted_with_its_sets(places: tuple[Workspace, Path], tmp_path
     run = shutil.copytree(places[1], tmp_path / "run")
     delete_run(run)
     assert not run.exists()
+
+
+def test_folders_that_were_swapped_or_linked_are_refused(
+    places: tuple[Workspace, Path], tmp_path: Path
+) -> None:
+    """One set's results are never shown or continued under another one's name."""
+    run = shutil.copytree(places[1], tmp_path / "run")
+    first, second = (run / "defended" / name for name in SETS)
+    first.rename(tmp_path / "first")
+    second.rename(first)
+    (tmp_path / "first").rename(second)
+    for use in (lambda: write_report(run, places[0]), lambda: run_campaign(places[0], "defended", run)):
+        with pytest.raises(MutatorError, match=r"the defences pedal_limit\+emergency_brake"):
+            use()
+    (run / "defended").rename(tmp_path / "sets")
+    (run / "defended").symlink_to(tmp_path / "sets")
+    with pytest.raises(MutatorError, match="defended"):
+        write_report(run, places[0])
+
+
+def test_a_report_is_written_whatever_the_order_of_a_set(copy_toycar: CopyToycar, tmp_path: Path) -> None:
+    """Defences act by priority, which need not be the order of the campaign."""
+    workspace = copy_toycar(tmp_path)
+    path = workspace.campaign("defended")
+    path.write_text(path.read_text().replace(KEY, "defences: [none, [emergency_brake, pedal_limit]]\n"))
+    assert run_campaign(workspace, "defended", tmp_path / "run").exit_code == 0
+    write_report(tmp_path / "run", workspace)
+    assert (tmp_path / "run" / "report" / "tables" / "defences_without_faults.csv").is_file()

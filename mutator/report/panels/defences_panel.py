@@ -105,10 +105,17 @@ def _sentences(sets: Sequence[DefendedSet]) -> Iterable[str]:
         name: sum(pair.outcome is PairOutcome.PREVENTED for pair in pairs) for name, pairs in worst.items()
     }
     best = max(
-        sets, key=lambda defended: (count_by_name[defended.name], prevented_share(defended.pairs).count)
+        sets,
+        key=lambda defended: (
+            count_by_name[defended.name],
+            prevented_share(defended.pairs).count,
+            len(worst[defended.name]),
+        ),
     )
     of, prevented = len(worst[best.name]), prevented_share(best.pairs)
-    if not of:
+    if not of and any(defended.lost_count for defended in sets):
+        yield "No undefended run with a hazard has a result with defences."
+    elif not of:
         yield "No undefended run has a hazard, so there was nothing to prevent."
     elif not prevented.count:
         yield "No set prevents any hazard."
@@ -122,6 +129,12 @@ def _sentences(sets: Sequence[DefendedSet]) -> Iterable[str]:
         ) + _open_text(best)
         yield _cost_sentence(best)
     for defended in sets:
+        if defended.missing_count:
+            missing = counted(defended.missing_count, "experiment")
+            yield f"`{defended.name}` is not finished: {missing} without a result are left out."
+        if defended.lost_count:
+            lost_text = counted(defended.lost_count, "run")
+            yield f"With `{defended.name}`, {lost_text} of experiments with a hazard cannot be compared."
         if defended.caused_goldens:
             runs = ", ".join(defended.caused_goldens)
             yield f"`{defended.name}` causes a hazard without any fault: in {runs}."
@@ -137,11 +150,10 @@ def _hazardous(defended: DefendedSet) -> list[DefendedPair]:
 
 
 def _cost_sentence(defended: DefendedSet) -> str:
-    false = sum(activity.is_false for activity in defended.golden_activities)
     unneeded = sum(pair.is_unneeded_activation for pair in defended.pairs)
     without = sum(pair.outcome in (PairOutcome.NO_HAZARD, PairOutcome.CAUSED) for pair in defended.pairs)
     return (
-        f"It also acts in {counted(false, 'fault-free drive')}, and in {unneeded} of "
+        f"It also acts in {counted(len(defended.false_goldens), 'fault-free drive')}, and in {unneeded} of "
         f"{counted(without, 'experiment')} that had no hazard without it."
     )
 
