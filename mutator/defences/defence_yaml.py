@@ -16,7 +16,7 @@ from mutator.defences.defence import Defence, Kind, Parameter, Role, Sense
 from mutator.defences.defence_models import load_defence_model
 from mutator.targets.observation_yaml import ValueModel
 from mutator.targets.observed_values import ObservedValue
-from mutator.triggers.conditions import RESERVED_NAMES, canonical_condition, canonical_formula
+from mutator.triggers.conditions import RESERVED_NAMES, canonical_condition, canonical_formula, names_in
 
 SCHEMA = "defence/1"
 _RESERVED_NAMES = (*RESERVED_NAMES, "math", "values", "senses", "is_active")
@@ -116,6 +116,16 @@ def load_defence(path: Path, templates: Path) -> Defence:
     with source.locating_errors(("lets_go_when",)):
         lets_go_when = canonical_condition(model.lets_go_when or f"not ({acts_when})", variables=names)
     defence_model = load_defence_model(templates, model.model, source)
+    model_parameters = defence_model.choose_parameters([*model.parameters], model.commands, source)
+    texts = (acts_when, lets_go_when, *(value.text for value in derived))
+    used = {*model_parameters, *(name for text in texts for name in names_in(text))}
+    if unused := next((name for name in model.parameters if name not in used), None):
+        raise source.error(
+            ("parameters", unused),
+            f"nothing uses '{unused}'",
+            expected="a parameter of the model, of a condition or of a formula",
+            remedy="correct its name, or remove it",
+        )
     return Defence(
         name=model.name,
         about=model.about,
@@ -131,7 +141,7 @@ def load_defence(path: Path, templates: Path) -> Defence:
             Parameter(name=name, value=float(p.value), unit=p.unit, about=p.about)
             for name, p in model.parameters.items()
         ),
-        model_parameters=defence_model.choose_parameters([*model.parameters], model.commands, source),
+        model_parameters=model_parameters,
         acts_when=acts_when,
         acts_after_s=model.acts_after_s,
         lets_go_when=lets_go_when,
