@@ -48,7 +48,7 @@ def test_the_page_begins_with_what_is_survived(page: "Page", explored: Path) -> 
     Markdown has sentence and table.
     """
     [sentence] = page.texts(".survived-sentence")
-    assert SPEC in sentence and "it first fails at" in sentence and "cells were driven" in sentence
+    assert SPEC in sentence and "first fails at" in sentence and "cells were driven" in sentence
     assert page.page.locator(".envelopes tbody tr").count() == page.page.locator("svg.plane").count() == 2
     top, after = (page.page.locator(name).bounding_box()["y"] for name in ("#survived", ".first-screen"))
     assert top < after and page.page.locator(".key-numbers").count() == 0
