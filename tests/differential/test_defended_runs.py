@@ -149,15 +149,16 @@ def test_outcomes_of_both_runs_can_be_compared(places: tuple[Workspace, Path]) -
 
 MODEL = """\
 class Model:
-    def __init__(self, *, level):
+    def __init__(self, *, level, highest_gas):
         self.level = level
+        self.gas = highest_gas
 
     def reset(self):
         pass
 
     def update(self, since_s, sensed, applied):
         level = self.level
-        return {"brake": (level, float("inf")), "gas": (0.0, 0.0)}
+        return {"brake": (level, float("inf")), "gas": (0.0, self.gas)}
 """
 SPEC = """\
 schema: fault_spec/1

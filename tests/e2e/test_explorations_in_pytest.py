@@ -101,7 +101,7 @@ def test_a_search_has_an_item_for_each_location(in_pytest: Pytest) -> None:
     """It fails for a finding if a user asks."""
     code, printed = in_pytest("--campaign", "searched", "--hazard-fails")
     assert code == 1, printed
-    assert re.search(r"sensor/lane/shifted .* in A from 1 for .* s: H3 after ", printed)
+    assert re.search(r"sensor/lane/shifted .* in A from 1 for .* s( \(inferred\))?: H3 after ", printed)
 
 
 @pytest.mark.parametrize("words", [("--require-reviewed",), ("--accept-versions",)])

@@ -114,9 +114,9 @@ def test_frequencies_of_the_road_weigh_the_shares(families: Workspace, tmp_path:
     )
     family.write_text(text)
     mutator.run("toy", workspace=families, out=run)
-    assert "weighted share" in mutator.load_run(run, workspace=families).report().markdown.read_text()
+    assert "weighted share |" in mutator.load_run(run, workspace=families).report().markdown.read_text()
     family.write_text(text.replace("weight: 3", "weight: 4"))
-    assert "weighted" not in mutator.load_run(run, workspace=families).report().markdown.read_text()
+    assert "weighted share |" not in mutator.load_run(run, workspace=families).report().markdown.read_text()
 
 
 def test_a_parameter_with_the_name_of_a_column_is_refused(families: Workspace) -> None:
