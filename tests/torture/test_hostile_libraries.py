@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 import mutator
 from mutator.errors import MutatorError
 from mutator.execution.cluster.bundle import Bundle, unpack_bundle
+from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.session_opening import open_session
 from mutator.serve.application import ServedSite, build_application
 from mutator.serve.served_runs import ServedRuns
@@ -153,15 +155,11 @@ def asked(world: World, address: str) -> tuple[int, str]:
 
 def packed(world: World) -> tuple[int, str]:
     """Pack a bundle for a cluster's workers, and write it as a worker does."""
+    run = world.out / "session"
+    choices = Choices(limit=2)
+    open_run = partial(open_or_freeze_run, world.workspace, "toy", run, choices, reviewed=False)
     try:
-        with open_session(
-            world.workspace,
-            "toy",
-            world.out / "session",
-            workers=1,
-            choices=Choices(limit=2),
-            engine="reference",
-        ) as session:
+        with open_session(world.workspace, open_run, run, workers=1, engine="reference") as session:
             session.prepare()
             data = Bundle.pack_for_run(world.workspace, session.folder, "reference").data
         (world.out / "place").mkdir()

@@ -273,7 +273,9 @@ def test_mutants_that_cannot_be_built_are_not_run(toycar: Workspace, tmp_path: P
     assert len(records) == len(experiments)
     assert records.pop("unsound").status is Status.INVALID_MUTANT
     assert {record.status for record in records.values()} == {Status.CRASHED}
+    manifest = toycar.manifest("toycar")  # of which no mutant was built yet
     del manifest.tree.files["toycar/sensing.py"]  # type: ignore[attr-defined]
+    runner = ExperimentRunner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
     statuses = [f.record.status for f in runner.run(experiments[:1])]
     assert statuses == [Status.HARNESS_ERROR]
 

@@ -4,12 +4,14 @@ import csv
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import mutator
 from mutator.errors import MutatorError
+from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.session import Session
 from mutator.execution.session_items import SessionItems
 from mutator.execution.session_opening import open_session
@@ -213,7 +215,9 @@ def test_an_item_of_what_was_left_out_is_skipped_with_the_reason(
 ) -> None:
     """Also if an earlier session left it out."""
     choices = mutator.Choices(only="scenario == 'CRASH' and variant == 'longer'", limit=1)
-    with open_session(with_crash, "small", tmp_path / "run", workers=0, choices=choices) as session:
+    run = tmp_path / "run"
+    open_run = partial(open_or_freeze_run, with_crash, "small", run, choices, reviewed=False)
+    with open_session(with_crash, open_run, run, workers=0) as session:
         session.prepare()
         items = SessionItems(session=session)
         [item] = items.list_work().items

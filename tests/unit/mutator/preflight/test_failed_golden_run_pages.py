@@ -4,12 +4,14 @@ import base64
 import gzip
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import mutator
 from mutator.errors import CheckFailed
+from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.session_opening import open_session
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
@@ -50,9 +52,11 @@ def test_a_campaign_under_pytest_leaves_the_page_too(toycar: Workspace, tmp_path
     """`pytest --campaign` prints the error of the session that it prepares."""
     entry = toycar.library.parent / "tree/toycar/world.py"
     entry.write_text(entry.read_text().replace('case["gap"]', "case[\"gap\"] + hash('x') % 9", 1))
+    run = tmp_path / "run"
+    open_run = partial(open_or_freeze_run, toycar, "small", run, Choices(), reviewed=False)
     with (
         pytest.raises(CheckFailed, match="look at the drive"),
-        open_session(toycar, "small", tmp_path / "run", workers=0, choices=Choices()) as session,
+        open_session(toycar, open_run, run, workers=0) as session,
     ):
         session.prepare()
     assert list((tmp_path / "run").glob("report/golden-*.html"))

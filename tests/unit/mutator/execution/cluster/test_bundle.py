@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from mutator.execution.cluster import bundle
 from mutator.execution.cluster.bundle import Bundle, load_run_inputs, unpack_bundle, unpack_growth
 from mutator.execution.cluster.packed_bytes import pack_parcel, unpack_parcel
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
+from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.session_opening import open_session
 from mutator.limits import MeasuredLimits
 from mutator.store.checks_file import CHECKS_FILE
@@ -29,7 +31,8 @@ def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Pat
     folder = tmp_path_factory.mktemp("checked")
     toy = copy_toycar(folder / "home" / "lib")
     run = folder / "home" / "run"
-    with open_session(toy, "small", run, workers=1, choices=Choices(), engine="reference") as session:
+    open_run = partial(open_or_freeze_run, toy, "small", run, Choices(), reviewed=False)
+    with open_session(toy, open_run, run, workers=1, engine="reference") as session:
         session.prepare()
     return folder / "home"
 

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceRe
 from mutator.execution.cluster.piece_queue import PieceQueue
 from mutator.execution.cluster.unpacked_bundle import UnpackedBundle
 from mutator.execution.cluster.worker_host import WorkerHost
+from mutator.execution.frozen_plan import open_or_freeze_run
 from mutator.execution.session_opening import open_session
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
@@ -54,7 +56,9 @@ def sent(tmp_path_factory: pytest.TempPathFactory, copy_toycar: object) -> tuple
     """What a worker receives for the toy's small campaign: the bundle, and a piece of work."""
     folder = tmp_path_factory.mktemp("sent")
     toy: Workspace = copy_toycar(folder)  # type: ignore[operator]
-    with open_session(toy, "small", folder / "run", workers=2, choices=Choices(), engine="fork") as session:
+    run = folder / "run"
+    open_run = partial(open_or_freeze_run, toy, "small", run, Choices(), reviewed=False)
+    with open_session(toy, open_run, run, workers=2, engine="fork") as session:
         session.prepare()
         board = PieceQueue(session.folder, session.pending, ())
         board.add_worker("w", 1)
