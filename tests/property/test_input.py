@@ -2,6 +2,7 @@
 
 import math
 import time
+from codecs import BOM_UTF8
 from contextlib import suppress
 from pathlib import Path
 
@@ -86,6 +87,7 @@ def test_a_damaged_spec_is_read_or_refused(tmp_path: Path, data: st.DataObject) 
 
 @settings(max_examples=150, deadline=None)
 @given(st.binary(max_size=100) | st.text("def f(x):\n=1#\"'\\ \t;", max_size=80).map(str.encode))
+@example(BOM_UTF8)
 @example(b"#\x80")  # LibCST's error has no line
 def test_any_source_is_read_or_refused(data: bytes) -> None:
     try:
@@ -93,7 +95,7 @@ def test_any_source_is_read_or_refused(data: bytes) -> None:
     except MutatorError as error:
         assert "x.py" in str(error)
     else:
-        assert b"".join(file.lines) == data
+        assert b"".join(file.lines) == data.removeprefix(BOM_UTF8)
 
 
 @given(st.floats() | st.integers(-(10**30), 10**30))

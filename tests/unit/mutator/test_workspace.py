@@ -105,7 +105,7 @@ def test_the_path_of_a_spec_file_must_match_its_module_and_fault_type(toy: Works
 
 
 def test_a_workspace_is_displayed_as_a_line_or_as_a_table(toycar: Workspace) -> None:
-    assert repr(toycar).endswith("9 fault specs, 2 scenarios, 1 context table, 3 campaigns, 1 target>")
+    assert repr(toycar).endswith("9 fault specs, 2 scenarios, 1 context table, 4 campaigns, 1 target>")
     shown = toycar._repr_html_()
     for name in ("sensor/lane", "near_far", "small", "toycar", str(toycar.templates)):
         assert name in shown

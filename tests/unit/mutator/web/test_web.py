@@ -52,7 +52,6 @@ def test_load_orders_name_every_script_once() -> None:
     }
     styles = {name for page in PAGES for name in web.load_order(page, ".css")}
     assert styles == {*web.asset_names(".css")} - {
-        "report/envelopes.css",
         "report/source.css",
         "serve/live.css",
     }
