@@ -54,7 +54,7 @@ def test_the_page_begins_with_what_is_survived(page: "Page", explored: Path) -> 
     assert top < after and page.page.locator(".key-numbers").count() == 0
     assert "no share of them" in page.page.inner_text("#survived")
     markdown = (explored / "report" / "REPORT.md").read_text()
-    words = "it first fails at"
+    words = "first fails at"
     assert markdown.index(words) < markdown.index("| fault | scenario |") < markdown.index("worst experiment")
 
 
