@@ -1,13 +1,20 @@
 """Pairs of one experiment without and with a set of defences, and what became of its hazard."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
 from mutator.model import Status
-from mutator.results.columns_of_defences import AFTER_FAULT, CONFLICTS, DEFENCE, DRIVER_AT_END, END_SPEED
+from mutator.results.columns_of_defences import (
+    AFTER_FAULT,
+    AUTHORITY_PREFIX,
+    CONFLICTS,
+    DEFENCE,
+    DRIVER_AT_END,
+    END_SPEED,
+)
 from mutator.results.result_rows import ResultRow
 
 STANDSTILL_MPS = 0.3  # below this, a car stands: as in openpilot, and in the hazards of the shipped target
@@ -20,9 +27,9 @@ class PairOutcome(StrEnum):
     PREVENTED = "prevented"  # none until the end, and nothing that can still cause one
     OPEN = "open"  # none until the end, but the drive ends too early to say more
     REPLACED = "replaced"  # another hazard instead
-    MITIGATED = "mitigated"  # the same, less severe
+    MITIGATED = "mitigated"  # the same, less severe, even with one more hazard; or as severe, with fewer
     UNCHANGED = "unchanged"  # the same, as severe
-    WORSENED = "worsened"  # the same, more severe, or one more hazard
+    WORSENED = "worsened"  # the same, more severe; or as severe, with one more hazard
     CAUSED = "caused"  # a hazard that the undefended run does not have
     NO_HAZARD = "no_hazard"  # in neither run
     NOT_COMPARED = "not_compared"  # one of the runs crashed, or is no result
@@ -47,8 +54,8 @@ class DefendedRow:
     authority: Mapping[str, float]
 
     @classmethod
-    def of_cells(cls, cells: Mapping[str, Any], commands: Mapping[str, str]) -> "DefendedRow":
-        """Return what the cells of a row of results say. `commands` maps each column to its command."""
+    def of_cells(cls, cells: Mapping[str, Any]) -> "DefendedRow":
+        """Return what the cells of a row of results say."""
         return cls(
             acted=tuple(filter(None, (cells[DEFENCE] or "").split(";"))),
             conflict_steps=int(cells[CONFLICTS] or 0),
@@ -56,7 +63,9 @@ class DefendedRow:
             end_speed=cells[END_SPEED],
             driver_at_end=bool(cells[DRIVER_AT_END]),
             authority={
-                command: cells[column] for column, command in commands.items() if cells[column] is not None
+                column.removeprefix(AUTHORITY_PREFIX): value
+                for column, value in cells.items()
+                if column.startswith(AUTHORITY_PREFIX) and value is not None
             },
         )
 
@@ -128,8 +137,3 @@ def _added_harm(undefended: ResultRow, defended: ResultRow) -> float:
         return 0.0
     change = defended.delta_v - undefended.delta_v
     return change if abs(change) >= LEAST_DELTA_V_CHANGE_MPS and math.isfinite(change) else 0.0
-
-
-def command_by_authority_column(columns: Sequence[str], prefix: str) -> dict[str, str]:
-    """Return the command of each column that begins with `prefix`."""
-    return {name: name.removeprefix(prefix) for name in columns if name.startswith(prefix)}

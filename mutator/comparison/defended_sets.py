@@ -13,13 +13,11 @@ from mutator.comparison.defended_pairs import (
     DefendedPair,
     DefendedRow,
     PairOutcome,
-    command_by_authority_column,
     pair_of,
 )
-from mutator.defences.defence_facts import DefenceFacts, set_name
+from mutator.defences.defence_facts import set_name
 from mutator.model import DefenceActivity, Outcome, Status
 from mutator.outcomes.defence_reports import load_activities
-from mutator.results.columns_of_defences import AUTHORITY_PREFIX
 from mutator.results.result_rows import ResultRow, cells_by_row
 from mutator.results.table_building import PARQUET_FILE
 from mutator.results.table_reader import Results
@@ -51,8 +49,8 @@ class DefendedSet:
     """
 
     name: str
-    folder: RunFolder
-    defences: tuple[DefenceFacts, ...]
+    undefended: ComparedRun
+    defended: ComparedRun
     pairs: tuple[DefendedPair, ...]
     golden_activities: tuple[GoldenActivity, ...]
     caused_goldens: tuple[str, ...]
@@ -98,8 +96,7 @@ def _load_set(undefended: ComparedRun, path: Path, observe_s: float) -> Defended
     for problem in plan_problems(defended.folder, undefended.folder):
         raise problem
     frame = Results(path).frame()
-    commands = command_by_authority_column([str(name) for name in frame.columns], AUTHORITY_PREFIX)
-    facts = {cells["experiment_id"]: DefendedRow.of_cells(cells, commands) for cells in cells_by_row(frame)}
+    facts = {cells["experiment_id"]: DefendedRow.of_cells(cells) for cells in cells_by_row(frame)}
     row_by_id = _rows_with_caused_hazards(undefended.folder, defended)
     pairs = tuple(
         pair_of(undefended.row_by_id[e.id], row_by_id[e.id], facts[e.id], observe_s)
@@ -108,8 +105,8 @@ def _load_set(undefended: ComparedRun, path: Path, observe_s: float) -> Defended
     )
     return DefendedSet(
         name=path.name,
-        folder=defended.folder,
-        defences=defended.folder.head.defences,
+        undefended=undefended,
+        defended=defended,
         pairs=pairs,
         golden_activities=tuple(_golden_activities(undefended.folder, defended.folder)),
         caused_goldens=tuple(_caused_goldens(undefended.folder, defended.folder)),

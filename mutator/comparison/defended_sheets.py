@@ -1,17 +1,23 @@
 """The tables of sets of defences: what they did with each hazard, what it took, and what it cost."""
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mutator.comparison.defended_pairs import DefendedPair, PairOutcome
 from mutator.comparison.defended_sets import DefendedSet
+from mutator.comparison.paired_rate_and_time_sheets import weights_of_experiments
 from mutator.results.result_rows import ResultRow
-from mutator.statistics.paired_statistics import mcnemar_test, rate_difference, resampled_interval
+from mutator.statistics.paired_statistics import mcnemar_test, rate_difference
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.shares_with_intervals import Share
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
+from mutator.statistics.weighted_shares import share_of_runs
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _HAZARD_OUTCOMES = (
     PairOutcome.PREVENTED,
@@ -45,8 +51,7 @@ def _outcomes_sheet(sets: Iterable[DefendedSet]) -> Sheet:
         note="Experiments with a hazard in the undefended run, by what became of it with each set; `caused` "
         "are those that had none, `not compared` those whose run with defences crashed or has no result. "
         "False activations are counted by fault-free drive. The interval of the prevented share resamples "
-        "whole faults; there is none if all agree. A sample's shares are those of its experiments, without "
-        "weights.",
+        "whole faults. A sample's share is weighted; counts are not.",
         heads=(
             *("defences", "hazards", "prevented", *(outcome.value for outcome in _HAZARD_OUTCOMES[1:])),
             *("not compared", "caused", "false activations", "unneeded activations", "with conflicts"),
@@ -60,7 +65,7 @@ def _outcome_line(defended: DefendedSet) -> tuple[SheetCell, ...]:
     return (
         defended.name,
         sum(counts[outcome] for outcome in _HAZARD_OUTCOMES),
-        prevented_share(defended.pairs),
+        prevented_share(defended),
         *(counts[outcome] for outcome in _HAZARD_OUTCOMES[1:]),
         defended.lost_count,
         counts[PairOutcome.CAUSED],
@@ -75,9 +80,9 @@ def _rates_sheet(sets: Iterable[DefendedSet]) -> Sheet:
         name="defence_rates",
         title="Hazards with and without defences, in pairs",
         note="Experiments that have a result without and with the set, and how many have a hazard. "
-        "Difference: the share with defences minus that without; its interval resamples whole faults. p: "
-        "McNemar's exact test of the pairs that differ; `faults` is the number of faults behind them, which "
-        "are fewer than the pairs that the test takes for independent.",
+        "Difference: the share with defences minus that without, weighted in a sample; its interval "
+        "resamples whole faults. p: McNemar's exact test of the pairs that differ; `faults` is the number of "
+        "faults behind them, which are fewer than the pairs that the test takes for independent.",
         heads=(
             *("defences", "pairs", "without", "with", "difference", "difference, low", "difference, high"),
             *("p", "pairs that differ", "faults"),
@@ -87,15 +92,11 @@ def _rates_sheet(sets: Iterable[DefendedSet]) -> Sheet:
 
 
 def _rate_line(defended: DefendedSet) -> tuple[SheetCell, ...]:
-    import pandas as pd
-
-    compared = [pair for pair in defended.pairs if pair.outcome is not PairOutcome.NOT_COMPARED]
-    before = pd.Series([bool(pair.undefended.hazards) for pair in compared], dtype=bool)
-    after = pd.Series([bool(pair.defended.hazards) for pair in compared], dtype=bool)
-    faults = pd.Series([pair.undefended.fault for pair in compared], dtype=object)
-    change = rate_difference(before, after, faults)
+    frame = _compared_frame(defended)
+    before, after, faults = frame["before"], frame["after"], frame["fault_id"]
+    change = rate_difference(before, after, faults, frame[WEIGHT_COLUMN])
     return (
-        *(defended.name, len(compared), int(before.sum()), int(after.sum())),
+        *(defended.name, len(frame), int(before.sum()), int(after.sum())),
         *(change.difference, change.low, change.high),
         PValue(mcnemar_test(before, after).p_value),
         int((before != after).sum()),
@@ -103,20 +104,34 @@ def _rate_line(defended: DefendedSet) -> tuple[SheetCell, ...]:
     )
 
 
-def prevented_share(pairs: Iterable[DefendedPair]) -> Share:
+def prevented_share(defended: DefendedSet) -> Share:
     """Return which share of the undefended hazards is prevented, with an interval that resamples faults."""
-    hazards, prevented = Counter[str](), Counter[str]()
-    for pair in pairs:
-        if pair.outcome in _HAZARD_OUTCOMES:
-            hazards[pair.undefended.fault] += 1
-            prevented[pair.undefended.fault] += pair.outcome is PairOutcome.PREVENTED
-    of, count = (np.array([counter[fault] for fault in hazards]) for counter in (hazards, prevented))
-    low, high = resampled_interval((count, of), _ratio) if len(of) else (math.nan, math.nan)
-    return Share(count=int(count.sum()), of=int(of.sum()), low=low, high=high)
+    frame = _compared_frame(defended)
+    return share_of_runs(frame, frame["prevented"], frame["before"])
 
 
-def _ratio(parts: np.ndarray, wholes: np.ndarray, axis: int = -1) -> np.ndarray:
-    return np.asarray(np.sum(parts, axis=axis) / np.sum(wholes, axis=axis))
+def _compared_frame(defended: DefendedSet) -> "pd.DataFrame":
+    """Return a frame with a row for each compared pair: its fault, its weight, and whether there was a hazard
+    before (without defences) and after (with them), and whether it was prevented. The weight is 1 unless the
+    undefended run is a sample.
+    """
+    import pandas as pd
+
+    compared = [pair for pair in defended.pairs if pair.outcome is not PairOutcome.NOT_COMPARED]
+    ids = [pair.undefended.experiment_id for pair in compared]
+    strata = defended.undefended.stratum_by_id
+    flags = {
+        "before": [bool(pair.undefended.hazards) for pair in compared],
+        "after": [bool(pair.defended.hazards) for pair in compared],
+        "prevented": [pair.outcome is PairOutcome.PREVENTED for pair in compared],
+    }
+    return pd.DataFrame(
+        {
+            "fault_id": pd.Series([pair.undefended.fault for pair in compared], dtype=object),
+            WEIGHT_COLUMN: pd.Series(weights_of_experiments(ids, strata) if strata else 1.0, range(len(ids))),
+            **{name: pd.Series(values, dtype=bool) for name, values in flags.items()},
+        }
+    )
 
 
 def _hazards_sheet(sets: Iterable[DefendedSet], hazards: Sequence[str]) -> Sheet:

@@ -57,9 +57,17 @@ def usable_pair_events(
     frame = frame.astype(dict.fromkeys(flags, bool) | {n: float for n in names if n not in flags})
     if stratum_by_id is None:
         return frame
-    strata = [stratum_by_id[p.row_a.experiment_id] for p in pairs if p.is_usable]
+    weights = weights_of_experiments([p.row_a.experiment_id for p in pairs if p.is_usable], stratum_by_id)
+    return frame.assign(**{WEIGHT_COLUMN: weights})
+
+
+def weights_of_experiments(
+    ids: Sequence[str], stratum_by_id: Mapping[str, tuple[Stratum, int]]
+) -> list[float]:
+    """Return how many planned experiments each of these of a sample stands for, if these alone are left."""
+    strata = [stratum_by_id[experiment_id] for experiment_id in ids]
     counts = Counter(strata)
-    return frame.assign(**{WEIGHT_COLUMN: [stratum[1] / counts[stratum] for stratum in strata]})
+    return [stratum[1] / counts[stratum] for stratum in strata]
 
 
 def _event_cells(row: ResultRow, side: str) -> dict[str, object]:

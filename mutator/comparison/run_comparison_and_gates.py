@@ -214,6 +214,17 @@ def compare_runs(
     Raise MutatorError if no experiment has a partner, and CheckFailed if a run's equivalence check failed.
     """
     a, b = load_compared_run(run_a, only), load_compared_run(run_b, only)
+    return compare_loaded_runs(a, b, golden_alerts_notes, scenes, envelopes)
+
+
+def compare_loaded_runs(
+    a: ComparedRun,
+    b: ComparedRun,
+    golden_alerts_notes: tuple[str, str] = ("", ""),
+    scenes: SceneOfEachRun = (None, None),
+    envelopes: EnvelopesOfEachRun = ((), ()),
+) -> Comparison:
+    """Like `compare_runs`, for runs that are in memory."""
     # classify both runs by the same scale, or neither, and by metrics that both have
     scale = b.folder.severity_scale if a.folder.severity_scale else None
     if scale:
@@ -225,7 +236,7 @@ def compare_runs(
         raise MutatorError(
             f"no experiment of {a.name} has a partner in {b.name} (campaign {' and '.join(campaigns)}; "
             f"experiments with a result: {len(a.row_by_id)} and {len(b.row_by_id)})",
-            where=run_b,
+            where=b.folder.path,
             argument="only",
             expected="runs of the same faults, scenarios and triggers",
             remedy="compare runs of one campaign, or widen `only`",

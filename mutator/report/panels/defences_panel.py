@@ -10,7 +10,7 @@ from mutator.comparison.comparison_replays import ReportAddresses
 from mutator.comparison.defended_pairs import DefendedPair, PairOutcome
 from mutator.comparison.defended_sets import DefendedSet, load_defended_sets
 from mutator.comparison.defended_sheets import defence_sheets, prevented_share
-from mutator.comparison.run_comparison_and_gates import compare_runs
+from mutator.comparison.run_comparison_and_gates import compare_loaded_runs
 from mutator.report.panel import REPORT_FOLDER, Panel, rendered
 from mutator.report.panels.tables_panel import sheet_csv_and_markdown_files
 from mutator.report.reported_run import ReportedRun, manifest_if_any
@@ -19,7 +19,11 @@ from mutator.store.allowed_contents import DEFENDED_FOLDER
 from mutator.targets.overhead_view_json import scene_as_json
 
 _SHEETS_SHOWN = (
-    *("defences", "defence_rates", "defended_hazards", "defended_severity", "defence_authority"),
+    "defences",
+    "defence_rates",
+    "defended_hazards",
+    "defended_severity",
+    "defence_authority",
     "defences_without_faults",
 )
 _HTML_TEMPLATE = """\
@@ -75,8 +79,8 @@ def _files_of_pairs(run: ReportedRun, defended: DefendedSet) -> dict[str, bytes]
     """Return the comparison of the undefended run with that of a set, drive by drive."""
     manifest = manifest_if_any(run.folder, run.workspace)
     scene = scene_as_json(manifest) if manifest else None
-    comparison = compare_runs(run.folder.path, defended.folder.path, scenes=(scene, scene))
-    report = defended.folder.path / REPORT_FOLDER / "index.html"
+    comparison = compare_loaded_runs(defended.undefended, defended.defended, scenes=(scene, scene))
+    report = defended.defended.folder.path / REPORT_FOLDER / "index.html"
     of_set = f"../../../{DEFENDED_FOLDER}/{quote(defended.name)}/{REPORT_FOLDER}/index.html"
     addresses = ReportAddresses(a="../../index.html", b=of_set if report.is_file() else "")
     folder = f"{DEFENDED_FOLDER}/{defended.name}"
@@ -108,11 +112,11 @@ def _sentences(sets: Sequence[DefendedSet]) -> Iterable[str]:
         sets,
         key=lambda defended: (
             count_by_name[defended.name],
-            prevented_share(defended.pairs).count,
+            defended.count_by_outcome[PairOutcome.PREVENTED],
             len(worst[defended.name]),
         ),
     )
-    of, prevented = len(worst[best.name]), prevented_share(best.pairs)
+    of, prevented = len(worst[best.name]), prevented_share(best)
     if not of and any(defended.lost_count for defended in sets):
         yield "No undefended run with a hazard has a result with defences."
     elif not of:

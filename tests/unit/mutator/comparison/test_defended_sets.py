@@ -7,6 +7,8 @@ import pytest
 
 from mutator.comparison import defended_sets
 from mutator.comparison.defended_pairs import PairOutcome, pair_of
+from mutator.comparison.defended_sets import DefendedSet
+from mutator.comparison.defended_sheets import prevented_share
 from mutator.model import Outcome, Status
 from mutator.store.golden_runs import GoldenRun
 
@@ -61,3 +63,22 @@ def test_golden_runs_with_one_more_hazard_are_told() -> None:
     undefended: Any = SimpleNamespace(golden_hazards={"S1": (H1,), "S2": (H1,)})
     defended: Any = SimpleNamespace(golden_hazards={"S1": (H1, H4), "S2": (H1,)})
     assert [*defended_sets._caused_goldens(undefended, defended)] == ["S1"]
+
+
+@pytest.mark.parametrize(("sizes", "rate"), [(None, 0.5), ((30, 10), 0.75)])
+def test_the_prevented_share_of_a_sample_is_weighted(sizes: tuple[int, int] | None, rate: float) -> None:
+    """The prevented hazard is in the larger stratum, and so stands for more of the plan."""
+    before = [row((H1,), experiment_id=name, variant=name) for name in "ab"]
+    after = [row(()), row((H1,))]
+    strata = {name: ((name,), size) for name, size in zip("ab", sizes, strict=True)} if sizes else None
+    undefended: Any = SimpleNamespace(stratum_by_id=strata)
+    defended = DefendedSet(
+        name="brake",
+        undefended=undefended,
+        defended=undefended,
+        pairs=tuple(pair_of(b, a, facts(**OVER), OBSERVE_S) for b, a in zip(before, after, strict=True)),
+        golden_activities=(),
+        caused_goldens=(),
+    )
+    share = prevented_share(defended)
+    assert (share.count, share.of, share.rate) == (1, 2, rate)

@@ -19,7 +19,11 @@ def pair(before: ResultRow, after: ResultRow) -> DefendedPair:
 
 
 def set_of(name: str, *pairs: DefendedPair, **given: Any) -> DefendedSet:
-    empty: dict[str, Any] = {"folder": SimpleNamespace(), "defences": (), "golden_activities": ()}
+    empty: dict[str, Any] = {
+        "undefended": SimpleNamespace(stratum_by_id=None),
+        "defended": SimpleNamespace(),
+        "golden_activities": (),
+    }
     return DefendedSet(name=name, pairs=pairs, **empty | {"caused_goldens": ()} | given)
 
 
