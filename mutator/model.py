@@ -331,9 +331,7 @@ class RunError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefenceActivity:
-    """What a defence did in one run, if it acted. Times in s; an activation is a row of steps in which it
-    acted.
-    """
+    """What a defence did in a run in which it acted. An activation is a row of such steps. Times in s."""
 
     name: str  #: name of the defence
     first: float  #: time of the first step in which it acted
@@ -395,8 +393,7 @@ class Record:
     t_back: float | None = added_field(None)
     #: whether the controller was not `engaged` at the end, although it was in the golden run
     ended_disengaged: bool = added_field(False)
-    #: what the defences in the tree did, in the order in which they act; only those that acted, and only if
-    #: the run ended normally
+    #: what each defence that acted did, in the order in which they act; only if the run ended normally
     defences: tuple[DefenceActivity, ...] = added_field(())
     #: the last step of a run in a tree with defences
     run_end: RunEnd | None = added_field(None)

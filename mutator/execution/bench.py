@@ -137,10 +137,10 @@ class Bench:
         with self._calling():
             batch = self._check_batch(experiments, reason)
             self._plan_new([e for e in batch if e.id not in self._plan.ids], reason)
-            assert self._session is not None
             self._begin_work()
-            self._session.find_work()
-            return self._session
+            session = self._begun_session()
+            session.find_work()
+            return session
 
     def submit(self, experiments: Iterable[Experiment], reason: str = "") -> None:
         """Plan a batch as `run` does, and return while it runs: `results` gives its records."""
@@ -387,16 +387,14 @@ class Bench:
         self._awaited.running |= {experiment.id for experiment in experiments}
 
     def _start_of_worker(self, number: int) -> WorkerStart:
-        assert self._session is not None
-        return self._session.start_of_worker(f"w{number}")
+        return self._begun_session().start_of_worker(f"w{number}")
 
     def _begun_session(self) -> Session:
         assert self._session is not None
         return self._session
 
     def _note_written(self, worker: str, written: Mapping[str, str]) -> None:
-        assert self._session is not None
-        self._session.written.add_report(written, worker)
+        self._begun_session().written.add_report(written, worker)
 
     def _has_final_record(self, experiment_id: str) -> bool:
         record = self._new_records.get(experiment_id) or self._stored_records.get(experiment_id)

@@ -309,7 +309,7 @@ class ExperimentRunner:
             reference = trace_and_record_loading.trace_until(reference, faulty[time][-1], time)
         faulty = trace_and_record_loading.with_golden_times(reference, faulty, time)
         if lost := find_lost_value(self.manifest, reference, faulty, judged.t_end):
-            problem = _reason_not_by_fault(lost.time_s, activation)
+            problem = golden_trace_comparison.reason_not_by_fault(lost.time_s, activation)
             status, detail = (
                 (Status.HARNESS_ERROR, f"{lost}: {problem}") if problem else (Status.CRASHED, str(lost))
             )
@@ -318,7 +318,7 @@ class ExperimentRunner:
         difference = golden_trace_comparison.compare_traces(
             reference, faulty, self.manifest.compared_channels, time, judged.t_end
         )
-        if problem := _reason_not_by_fault(difference.t_first, activation):
+        if problem := golden_trace_comparison.reason_not_by_fault(difference.t_first, activation):
             return record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, problem, mutant)
         compared = self._golden_hazard_rules.compare(
             self.goldens, experiment, judged, activation, was_stopped=execution.was_stopped_at_hazard
@@ -392,13 +392,3 @@ class ExperimentRunner:
 
 def _describe_problem(err: MutatorError) -> str:
     return f"{Path(err.where or '').name}: {err.got}"
-
-
-def _reason_not_by_fault(t_first: float | None, activation: ObservedActivation | None) -> str:
-    """Return why the fault cannot have caused a difference from the golden run; empty if it can."""
-    if t_first is None or (activation is not None and t_first >= activation.first):
-        return ""
-    when = "although the fault was never active"
-    if activation is not None:
-        when = f"before the fault was first active ({activation.first} s)"
-    return f"differs from the golden run at {t_first} s, {when}"

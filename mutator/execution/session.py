@@ -37,11 +37,11 @@ from mutator.execution.finished_outcome_cache import (
 from mutator.execution.session_checks import SessionChecks
 from mutator.execution.session_proof import prove_rest_of_sample, remaining_proof
 from mutator.execution.session_reuse import SessionReuse, count_reused
-from mutator.execution.session_summary import Summary
+from mutator.execution.session_summary import Summary, has_reached_nothing
 from mutator.execution.worker import Worker, WorkerAssignment, WorkerStart
 from mutator.execution.worker_names import new_worker_prefix, unused_worker_name
 from mutator.execution.written_files import WrittenFiles
-from mutator.model import Outcome, Record
+from mutator.model import Record
 from mutator.preflight import equivalence_check
 from mutator.preflight.preflight_checks import checks_and_goldens_exist
 from mutator.results import table_building
@@ -312,7 +312,7 @@ class Session:
             seals=seals,
             not_forked=not_forked,
             elapsed_s=time.monotonic() - self._start_s,
-            has_reached_nothing=self._has_reached_nothing(outcomes),
+            has_reached_nothing=has_reached_nothing(self.folder, outcomes, self._unselected_count),
             reused=count_reused(self.folder, self.worker_prefix),
             unselected=self._unselected_count,
             is_provisional=is_provisional,
@@ -369,18 +369,11 @@ class Session:
             seals=outcome.seals,
             not_forked="" if outcome.proof else self._not_forked,
             elapsed_s=time.monotonic() - self._start_s,
-            has_reached_nothing=self._has_reached_nothing(outcome.outcomes),
+            has_reached_nothing=has_reached_nothing(self.folder, outcome.outcomes, self._unselected_count),
             golden_hazards_note=left_out_note_of_records(
                 self.folder, self.folder.records(), outcome.outcomes
             ),
         )
-
-    def _has_reached_nothing(self, outcomes: Counter[str]) -> bool:
-        """Whether the whole plan shows no hazard. A part of it alone cannot tell."""
-        is_whole = self.folder.shard is None and not self._unselected_count
-        is_undefended = not self.folder.head.defences  # no hazard with defences is a result
-        no_hazard = self.folder.canary is None and not outcomes[Outcome.HAZARD]
-        return no_hazard and is_whole and is_undefended
 
     @contextmanager
     def _noting_full_disk(self) -> Iterator[None]:

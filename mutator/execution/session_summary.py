@@ -7,8 +7,9 @@ from pathlib import Path
 
 from mutator.audit.run_digests_and_seal import Seals
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, EXIT_OK
-from mutator.model import Status
+from mutator.model import Outcome, Status
 from mutator.preflight import equivalence_check
+from mutator.store.run_folder import RunFolder
 
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 
@@ -112,3 +113,12 @@ class Summary:
         if not whole or self.problem:
             return EXIT_HARNESS_ERRORS
         return EXIT_CHECK_FAILED if self.has_reached_nothing or self.has_left_out_all else EXIT_OK
+
+
+def has_reached_nothing(folder: RunFolder, outcomes: Mapping[str, int], unselected_count: int) -> bool:
+    """Whether a whole plan without a canary shows no hazard. A part of it alone cannot tell, and no hazard
+    with defences is a result.
+    """
+    is_whole = folder.shard is None and not unselected_count
+    is_undefended = not folder.head.defences
+    return folder.canary is None and not outcomes.get(Outcome.HAZARD) and is_whole and is_undefended

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mutator.model import ObservedActivation
 from mutator.outcomes.trace_and_record_loading import Trace, newest_values, times_of
 from mutator.targets.channels import Channel
 
@@ -147,3 +148,13 @@ def _absolute_difference(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
     with np.errstate(invalid="ignore", over="ignore"):
         difference = np.abs(faulty - golden)
     return np.where(same, 0.0, np.where(np.isnan(difference), np.inf, difference))
+
+
+def reason_not_by_fault(t_first: float | None, activation: ObservedActivation | None) -> str:
+    """Return why the fault cannot have caused a difference from the golden run; empty if it can."""
+    if t_first is None or (activation is not None and t_first >= activation.first):
+        return ""
+    when = "although the fault was never active"
+    if activation is not None:
+        when = f"before the fault was first active ({activation.first} s)"
+    return f"differs from the golden run at {t_first} s, {when}"
