@@ -12,7 +12,6 @@ CHALLENGED_MODEL = "offset"  # the fault model whose error has a size with a sig
 _CHALLENGING_MODEL = "waveform"
 _HALF_PERIODS_S = (0.05, 0.16, 0.5, 1.6, 5.0)
 _GLITCH_PERIOD_S, _GLITCH_STEPS = 0.5, 2
-_SHAPE_PARAMS = ("shape", "period", "width")
 _SEED_MARK = "seed_"
 _MOST_SEED = 2**53  # every integer up to this is exact as a double
 
@@ -106,22 +105,6 @@ def challenging_fault(fault: Fault, name: str, *, duration_s: float, step_s: flo
         for i, injection in enumerate(fault.injections)
     )
     return replace(fault, spec=name_with_form(fault.spec, name), injections=tuple(injections))
-
-
-def has_expected_shape(fault: Fault, duration_s: float, step_s: float) -> bool:
-    """Whether a fault of this duration injects what its name says, if that is the name of a challenger."""
-    _, mark, form = fault.spec.partition(FORM_MARK)
-    if not mark or not is_challenger(form):
-        return True
-    try:
-        challenger = challenger_of(form)
-    except MutatorError:
-        return False
-    expected = _shape_params(challenger, duration_s=duration_s, step_s=step_s)
-    params = [dict(injection.params) for injection in fault.injections]
-    return bool(params) and all(
-        {name: values[name] for name in _SHAPE_PARAMS if name in values} == expected for values in params
-    )
 
 
 def _challenging_injection(

@@ -14,20 +14,21 @@ from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.campaigns.exploration_section import ExplorationSection
 from mutator.errors import MutatorError
 from mutator.explore.cell_results import Drive
-from mutator.explore.challengers import challenger_of, has_expected_shape, name_with_form
+from mutator.explore.challengers import challenger_of, name_with_form
 from mutator.explore.envelope import Envelope
 from mutator.explore.exploration import BatchLoop, BatchProposer, Exploration, Proposal, reason_of_batch
 from mutator.explore.finding_search import FindingSearch
 from mutator.explore.golden_drives import drive_of, load_observed_values
+from mutator.explore.planned_faults import PlannedFaults
 from mutator.families.family import argument_of
-from mutator.model import AfterHazard, Experiment, Hold, Record, Status
+from mutator.model import AfterHazard, Experiment, Hold, Method, Record, Status
 from mutator.store import plan_file
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.plan_file import BATCHES_FILE, EXPERIMENTS_FILE
 from mutator.store.plan_lines import read_plan_lines
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import trigger_time_s
+from mutator.triggers.trigger_kinds import named_with_hold, trigger_at_time, trigger_time_s
 
 # spec, value, scenario, start, duration, seed: what tells an experiment of an exploration from all others
 _CellKey = tuple[str, object, str, float | None, float | None, int]
@@ -126,11 +127,14 @@ class _ExploredPlan:
         self.ids: list[str] = []
         self.keys: list[_CellKey] = []
         self.golden_by_key: dict[_GoldenKey, GoldenRun] = {}
-        for experiment in plan_file.iterate_experiments(folder.path):
-            key = _key_of_experiment(experiment, after_hazard, step_s)
+        faults = PlannedFaults(step_s)
+        for position, experiment in enumerate(plan_file.iterate_experiments(folder.path)):
+            faults.note(position, experiment)
+            key = _key_of_experiment(experiment, after_hazard)
             self.ids.append(experiment.id)
             self.keys.append(key)
             self.golden_by_key.setdefault((key[0], key[2], key[5]), folder.golden_run_of(experiment))
+        self.wrong_faults = frozenset(faults.wrong_positions())
         for problem in plan_file.batch_problems(folder.path, len(self.ids)):
             raise problem
         self.batches = [json.loads(line) for line in read_plan_lines(folder.path / BATCHES_FILE)]
@@ -197,14 +201,20 @@ class _ReplayedPlan:
         planned = self._plan.keys[self._position : self._position + len(keys)]
         for number, (got, expected) in enumerate(zip(planned, keys, strict=True), self._position + 1):
             if got != expected:
-                return MutatorError(
-                    _cell_text(got),
-                    where=self._plan.folder.path / EXPERIMENTS_FILE,
-                    line=number,
-                    expected=f"{_cell_text(expected)}, which follows from the records",
-                    remedy=_REMEDY,
+                return self._experiment_error(
+                    number, _cell_text(got), f"{_cell_text(expected)}, which follows from the records"
+                )
+            if number - 1 in self._plan.wrong_faults:
+                return self._experiment_error(
+                    number,
+                    f"{_cell_text(got)} injects another fault",
+                    "that of its name, which follows from the others of this variant",
                 )
         return None
+
+    def _experiment_error(self, number: int, got: str, expected: str) -> MutatorError:
+        where = self._plan.folder.path / EXPERIMENTS_FILE
+        return MutatorError(got, where=where, line=number, expected=expected, remedy=_REMEDY)
 
     def _batch_error(self, got: str, expected: str) -> MutatorError:
         where = self._plan.folder.path / BATCHES_FILE
@@ -222,16 +232,21 @@ class _ReplayedPlan:
         )
 
 
-def _key_of_experiment(experiment: Experiment, after_hazard: AfterHazard, step_s: float) -> _CellKey:
-    trigger = experiment.trigger
-    is_from_time_on = trigger.hold is Hold.FOR and trigger.armed_after_s == 0.0 and not experiment.setting
-    is_from_time_on &= experiment.after_hazard is after_hazard
-    is_from_time_on &= has_expected_shape(experiment.fault, trigger.hold_s or 0.0, step_s)
+def _key_of_experiment(experiment: Experiment, after_hazard: AfterHazard) -> _CellKey:
+    trigger, start_s = experiment.trigger, trigger_time_s(experiment.trigger)
+    is_from_time_on = (
+        start_s is not None
+        and trigger == named_with_hold(trigger_at_time(start_s, hold_s=trigger.hold_s))
+        and trigger.hold is Hold.FOR
+        and experiment.method is Method.GUIDED
+        and not experiment.setting
+        and experiment.after_hazard is after_hazard
+    )
     return (
         experiment.fault.spec,
         experiment.fault.value,
         _scenario_key(argument_of(experiment.concrete) if experiment.concrete else experiment.scenario),
-        trigger_time_s(trigger) if is_from_time_on else None,
+        start_s if is_from_time_on else None,
         trigger.hold_s,
         experiment.seed,
     )
