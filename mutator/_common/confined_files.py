@@ -30,7 +30,7 @@ _NO_LINK_NO_WAIT_FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 # O_EXCL: a file that somebody puts there meanwhile is not written to.
 _NEW_FILE_FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 _MOST_DEPTH, _MOST_OUTPUT_DEPTH = 30, 20  # folders in each other; an output lies in a few others
-_MOST_NAME_BYTES = 220  # bytes; Linux allows 255, and a half-written file has a longer name
+MOST_NAME_BYTES = 220  # bytes; Linux allows 255, and a half-written file has a longer name
 
 
 def checked_relative_path(name: object, where: str | Path, *, allow_folders: bool = True) -> str:
@@ -278,6 +278,6 @@ def not_plain_error(path: Path) -> UnsafePath:
 
 def _is_short_enough(part: str) -> bool:
     try:
-        return len(part.encode()) <= _MOST_NAME_BYTES
+        return len(part.encode()) <= MOST_NAME_BYTES
     except UnicodeEncodeError:
         return False

@@ -15,6 +15,7 @@ from mutator.api.run_figures import RunFigures
 from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
 from mutator.audit.run_digests_and_seal import Seals, seals_of
 from mutator.campaigns.defended_runs import list_defended_runs
+from mutator.comparison.defended_sets import describe_caused_golden_hazards
 from mutator.errors import MutatorError
 from mutator.execution.session_summary import Summary
 from mutator.exports import ExportSelection, Format, find_export
@@ -203,6 +204,10 @@ class Run(RunFigures):
         judged; empty if none has.
         """
         return golden_hazards_note(self.folder, self._results_frame)
+
+    def defence_hazards_note(self) -> str:
+        """Return a line for each set of defences that causes a hazard in a golden run; empty if none does."""
+        return describe_caused_golden_hazards(self.folder)
 
     def experiment(self, id: str) -> RunExperiment:
         """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import checked_name_not_path
+from mutator._common.confined_files import MOST_NAME_BYTES, checked_name_not_path
 from mutator._common.message_text import describe_choices
 from mutator.campaigns.campaign_model import CampaignModel, Canary, SelectionModel
 from mutator.campaigns.campaign_triggers import (
@@ -235,6 +235,13 @@ def _defence_sets(model: CampaignModel, source: YamlSource) -> tuple[tuple[str, 
                 "a set of no defence" if not names else f"the set {set_name(names)} twice",
                 expected="different sets of defences",
                 remedy="remove it",
+            )
+        if len(set_name(names).encode()) > MOST_NAME_BYTES:
+            raise source.error(
+                ("defences", i),
+                f"{len(names)} defences whose names have {len(set_name(names).encode())} bytes together",
+                expected=f"at most {MOST_NAME_BYTES}, because the run folder of the set has their names",
+                remedy="give the defences shorter names, or test them in smaller sets",
             )
         sets.append(names)
     return tuple(sets)

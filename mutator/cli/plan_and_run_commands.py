@@ -319,6 +319,8 @@ def _print_results_as_json(
 
 def _print_results(terminal: Terminal, run: "Run", summary: "Summary") -> None:
     """Print what does not need to wait for stills and report."""
+    if summary.defended and (note := run.defence_hazards_note()):
+        terminal.print_text(note)
     if summary.results and summary.planned:
         print_outcome_counts(terminal, run)
     if not summary.is_provisional and (note := run.drives_note()):

@@ -21,6 +21,7 @@ from mutator.outcomes.defence_reports import load_activities
 from mutator.results.result_rows import ResultRow, cells_by_row
 from mutator.results.table_building import PARQUET_FILE
 from mutator.results.table_reader import Results
+from mutator.store.checks_file import HazardTimes, describe_golden_hazards
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.run_folder import RunFolder
 
@@ -109,7 +110,7 @@ def _load_set(undefended: ComparedRun, path: Path, observe_s: float) -> Defended
         defended=defended,
         pairs=pairs,
         golden_activities=tuple(_golden_activities(undefended.folder, defended.folder)),
-        caused_goldens=tuple(_caused_goldens(undefended.folder, defended.folder)),
+        caused_goldens=tuple(caused_golden_hazards(undefended.folder, defended.folder)),
         missing_count=len(undefended.row_by_id) - len(pairs),
     )
 
@@ -138,11 +139,23 @@ def _rows_with_caused_hazards(undefended: RunFolder, defended: ComparedRun) -> d
     return rows
 
 
-def _caused_goldens(undefended: RunFolder, defended: RunFolder) -> Iterator[str]:
-    """Yield the golden runs that have a hazard with defences that they do not have without them."""
-    for key in sorted(defended.golden_hazards):
-        if {*_golden_hazards(defended, key)} - {*_golden_hazards(undefended, key)}:
-            yield key
+def caused_golden_hazards(undefended: RunFolder, defended: RunFolder) -> dict[str, HazardTimes]:
+    """Return the hazards that golden runs have with defences only, by the keys of these runs."""
+    hazards_by_key = {
+        key: tuple(h for h in hazards if h[0] not in _golden_hazards(undefended, key))
+        for key, hazards in sorted(defended.golden_hazards.items())
+    }
+    return {key: hazards for key, hazards in hazards_by_key.items() if hazards}
+
+
+def describe_caused_golden_hazards(run: RunFolder) -> str:
+    """Return a line for each set of defences that causes a hazard without a fault; '' if none does."""
+    lines = []
+    for path in list_defended_runs(run.path):
+        if hazards_by_key := caused_golden_hazards(run, RunFolder.open(path)):
+            goldens = (f"{key} ({describe_golden_hazards(h)})" for key, h in hazards_by_key.items())
+            lines.append(f"with {path.name}, a hazard without any fault, by a defence: {', '.join(goldens)}")
+    return "\n".join(lines)
 
 
 def _golden_activities(undefended: RunFolder, defended: RunFolder) -> Iterator[GoldenActivity]:

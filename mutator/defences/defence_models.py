@@ -29,13 +29,17 @@ _METHODS = {"reset": ("self",), "update": ("self", "since_s", "sensed", "applied
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefenceModelFile:
-    """A model's file: the numbers that it takes, those that it needs, and whether it takes others, too."""
+    """A model's file: the numbers that it takes, those that it needs, and whether it takes others, too.
+
+    The names of those others are `<word>_<command>`, with a word of `bounds`; None: any word.
+    """
 
     path: Path
     code: bytes
     parameters: tuple[str, ...]
     required_parameters: tuple[str, ...]
     takes_any: bool
+    bounds: tuple[str, ...] | None
 
     def choose_parameters(
         self, names: Sequence[str], commands: Collection[str], source: YamlSource
@@ -49,10 +53,21 @@ class DefenceModelFile:
                     expected=f"the parameters of model {self.path.stem}: {', '.join(self.parameters)}",
                     remedy="add it, with its unit",
                 )
-        ends = tuple(f"_{command}" for command in commands)
-        return tuple(
-            name for name in names if name in self.parameters or (self.takes_any and name.endswith(ends))
-        )
+        return tuple(name for name in names if name in self.parameters or self._is_bound(name, commands))
+
+    def _is_bound(self, name: str, commands: Collection[str]) -> bool:
+        if not self.takes_any:
+            return False
+        if self.bounds is None:
+            return name.endswith(tuple(f"_{command}" for command in commands))
+        return name in (f"{word}_{command}" for word in self.bounds for command in commands)
+
+    def describe_parameters(self, commands: Sequence[str]) -> str:
+        """Return which parameters the model takes, as text."""
+        names = list(self.parameters)
+        if self.takes_any:
+            names += [f"{word}_{command}" for word in self.bounds or ("...",) for command in commands]
+        return ", ".join(names) or "none"
 
 
 def load_defence_model(templates: Path, name: str, source: YamlSource) -> DefenceModelFile:
@@ -92,7 +107,23 @@ def load_defence_model(templates: Path, name: str, source: YamlSource) -> Defenc
             if default is None
         ),
         takes_any=arguments.kwarg is not None,
+        bounds=_bounds(tree, path),
     )
+
+
+def _bounds(tree: ast.Module, path: Path) -> tuple[str, ...] | None:
+    """Return a model's `BOUNDS`, the first words of parameters that it takes without naming them."""
+    for node in tree.body:
+        match node:
+            case ast.Assign(targets=[ast.Name(id="BOUNDS")], value=value):
+                items = value.elts if isinstance(value, ast.Tuple) else []
+                words = [item.value for item in items if isinstance(item, ast.Constant)]
+                names = tuple(word for word in words if isinstance(word, str) and word.isidentifier())
+                if names and len(names) == len(items):
+                    return names
+                expected = 'first words of parameters, e.g. ("lowest", "highest")'
+                raise _model_error(f"BOUNDS = {ast.unparse(value)}", path, node.lineno, expected)
+    return None
 
 
 def _check_uses(tree: ast.Module, path: Path) -> None:

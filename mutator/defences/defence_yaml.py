@@ -1,6 +1,7 @@
 """Read the defences of a library, `fault_library/defences/<name>.yaml`."""
 
 import keyword
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal
@@ -73,7 +74,7 @@ class DefenceModel(StrictModel, title="The file"):
     parameters: dict[str, ParameterModel] = Field(
         default_factory=dict,
         description="Name -> a number. The model gets those that it declares; a model that takes any "
-        "(`**bounds`) also gets those whose names end in `_<command>`.",
+        "(`**bounds`) also gets those named `<word>_<command>`, with a word of its `BOUNDS`.",
     )
     acts_when: str = Field(
         "True", description="The condition under which it becomes active. Without it, it always is."
@@ -117,13 +118,16 @@ def load_defence(path: Path, templates: Path) -> Defence:
         lets_go_when = canonical_condition(model.lets_go_when or f"not ({acts_when})", variables=names)
     defence_model = load_defence_model(templates, model.model, source)
     model_parameters = defence_model.choose_parameters([*model.parameters], model.commands, source)
+    if defence_model.bounds:
+        _check_bounds(model, model_parameters, source)
     texts = (acts_when, lets_go_when, *(value.text for value in derived))
     used = {*model_parameters, *(name for text in texts for name in names_in(text))}
     if unused := next((name for name in model.parameters if name not in used), None):
         raise source.error(
             ("parameters", unused),
             f"nothing uses '{unused}'",
-            expected="a parameter of the model, of a condition or of a formula",
+            expected=f"a parameter of the model ({defence_model.describe_parameters(model.commands)}), of a "
+            "condition or of a formula",
             remedy="correct its name, or remove it",
         )
     return Defence(
@@ -171,6 +175,28 @@ def _check_names(model: DefenceModel, source: YamlSource) -> None:
                     remedy="rename it",
                 )
             used_names.add(name)
+
+
+def _check_bounds(model: DefenceModel, model_parameters: Iterable[str], source: YamlSource) -> None:
+    """Refuse bounds of a command that cross, and a negative rate."""
+    value_by_name = {name: model.parameters[name].value for name in model_parameters}
+    for command in model.commands:
+        lowest, highest, rate = (f"{word}_{command}" for word in ("lowest", "highest", "rate"))
+        low, high = value_by_name.get(lowest, -math.inf), value_by_name.get(highest, math.inf)
+        if low > high:
+            raise source.error(
+                ("parameters", lowest, "value"),
+                f"{low:g}",
+                expected=f"at most `{highest}`, {high:g}",
+                remedy="swap or correct them",
+            )
+        if value_by_name.get(rate, 0.0) < 0:
+            raise source.error(
+                ("parameters", rate, "value"),
+                f"{value_by_name[rate]:g}",
+                expected="a largest change per second, at least 0",
+                remedy="remove the sign",
+            )
 
 
 def _build_sense(name: str, model: SenseModel, source: YamlSource) -> Sense:

@@ -88,25 +88,22 @@ def _decision_source(defence: Defence, index_by_name: Mapping[tuple[bool, str], 
         (sense.name, _reading_source(sense, number, index_by_name[sense.is_truth, sense.value]))
         for number, sense in enumerate(defence.senses)
     ]
-    steps += [(parameter.name, repr(parameter.value)) for parameter in defence.parameters]
-    steps += [(value.name, to_python_source(value.text, is_formula=True)) for value in defence.derived]
-    acts, lets_go = map(to_python_source, (defence.acts_when, defence.lets_go_when))
-    sensed = "".join(f"{name}, " for name in sensed_names(defence))
+    numbers = {parameter.name: parameter.value for parameter in defence.parameters}
+    steps += [
+        (value.name, to_python_source(value.text, numbers, is_formula=True)) for value in defence.derived
+    ]
+    acts, lets_go = (to_python_source(text, numbers) for text in (defence.acts_when, defence.lets_go_when))
+    sensed = ", ".join(f'"{name}": {name}' for name, _ in steps)
     lines = [
         f"def _decide_{defence.name}(t, values, senses, is_active):",
         *(f"    {name} = {code}" for name, code in steps),
-        f"    return ({lets_go}) if is_active else ({acts}), ({sensed})",
+        f"    return ({lets_go}) if is_active else ({acts}), {{{sensed}}}",
     ]
     return "\n".join(lines)
 
 
 def _reading_source(sense: Sense, number: int, index: int) -> str:
     return f"senses[{number}].read(t, values)" if sense.delay_s or sense.noise else f"values[{index}]"
-
-
-def sensed_names(defence: Defence) -> tuple[str, ...]:
-    """Return the names of sensed and derived values."""
-    return (*(sense.name for sense in defence.senses), *(value.name for value in defence.derived))
 
 
 def _constructor_source(defence: Defence, index_by_name: Mapping[tuple[bool, str], int]) -> str:
@@ -121,7 +118,6 @@ def _constructor_source(defence: Defence, index_by_name: Mapping[tuple[bool, str
         f"{defence_module_name(defence.name)}.Model({numbers})",
         f"_decide_{defence.name}",
         repr([input_of(sense) for sense in defence.senses]),
-        repr(sensed_names(defence)),
         repr(defence.commands),
         repr(defence.acts_after_s),
         repr(defence.lets_go_after_s),

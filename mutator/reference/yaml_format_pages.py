@@ -36,7 +36,9 @@ this step, or values of the controller, each with the delay and noise of the fil
 held for `acts_after_s`, it becomes active; while `lets_go_when` has held for `lets_go_after_s`, it ends.
 Changed commands reach the plant with the next step, so a defence is one step late.
 
-While active, its model gives ranges for commands, and each command is clamped to its range. With several
+While active, its model gives ranges for commands, and each command is clamped to its range. A command that is
+NaN, or infinite where its range has no bound, is replaced by the value that reached the plant in the step
+before (0 if that is not finite), in its range. With several
 defences, that of the highest `priority` comes last and decides. A defence *acts* in a step in which a
 command that reaches the plant differs from the controller's by more than the command's `tolerance` because
 of it. Several such steps in a row are one *activation*. Two defences are in *conflict* in a step in which

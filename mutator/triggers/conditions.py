@@ -86,9 +86,22 @@ def names_in(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(node.id for node in ordered if node.id not in _BUILT_IN_NAMES))
 
 
-def to_python_source(text: str, *, is_formula: bool = False) -> str:
-    """Convert a checked condition or formula to Python that cannot raise and uses `_div` and `math`."""
-    writer = _ExpressionWriter(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
+def to_python_source(
+    text: str, constants: Mapping[str, float] | None = None, *, is_formula: bool = False
+) -> str:
+    """Convert a checked condition or formula to Python that cannot raise and uses `_div` and `math`.
+
+    With `constants`, which replace their names, a division by a constant that is not 0 needs no `_div`.
+    """
+    writer = _ExpressionWriter(
+        text,
+        constants or {},
+        None,
+        divide="_div({}, {})",
+        divide_by_constant=None if constants is None else "({} / {})",
+        infinity="math.inf",
+        hypot="math.hypot",
+    )
     return (
         writer.write_number(parse_expression(text))
         if is_formula
@@ -139,6 +152,19 @@ def parse_expression(text: str) -> ast.expr:
         raise _syntax_error(f"{getattr(error, 'msg', error)}", text, None, hint) from None
 
 
+def _is_nonzero_constant(node: ast.expr, constants: Mapping[str, float]) -> bool:
+    """Whether an expression is a number or a constant, with or without a sign, and not 0."""
+    match node:
+        case ast.Constant(value=int() | float() as value):
+            return bool(value)
+        case ast.Name(id=name):
+            return bool(constants.get(name))
+        case ast.UnaryOp(operand=operand):
+            return _is_nonzero_constant(operand, constants)
+        case _:
+            return False
+
+
 class _GoldenNameJoiner(ast.NodeTransformer):
     """Turns `golden.gap` into one name."""
 
@@ -160,6 +186,7 @@ class _ExpressionWriter:
         variables: Collection[str] | None,
         *,
         divide: str,
+        divide_by_constant: str | None = None,
         infinity: str = "inf",
         hypot: str = "hypot",
         over_time: bool = False,
@@ -168,6 +195,7 @@ class _ExpressionWriter:
         self.constants = constants
         self.variables = variables
         self.division_format = divide
+        self.constant_division_format = divide_by_constant or divide
         self.replacements = {"inf": infinity, "hypot": hypot}
         self.over_time = over_time
 
@@ -218,7 +246,10 @@ class _ExpressionWriter:
         if isinstance(node, ast.BinOp) and type(node.op) in _ARITHMETIC_SIGNS:
             left, right = self._write_term(node.left), self._write_term(node.right)
             if isinstance(node.op, ast.Div):
-                return self.division_format.format(left, right)
+                is_constant = _is_nonzero_constant(node.right, self.constants)
+                return (self.constant_division_format if is_constant else self.division_format).format(
+                    left, right
+                )
             return f"({left} {_ARITHMETIC_SIGNS[type(node.op)]} {right})"
         if isinstance(node, ast.Call):
             return self._write_call(node)

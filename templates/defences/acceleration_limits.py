@@ -3,6 +3,9 @@
 It reads `highest_gas` and `highest_brake`, the pedals that give the largest acceleration and deceleration;
 `lateral_acceleration` (m/s^2, left positive); `holding_torque`, which keeps the steering wheel where it is;
 and `jerk_per_torque` (m/s^3), the lateral jerk for each torque beyond that.
+
+A command that is not a finite number cannot pass: the runtime puts the value of the step before in its place,
+or 0 without one, and limits that.
 """
 
 import math
@@ -19,9 +22,8 @@ class Model:
 
     def update(self, since_s, sensed, applied):
         """Return ranges for the pedals and the torque."""
-        holding, gain, acceleration = (
-            sensed[name] for name in ("holding_torque", "jerk_per_torque", "lateral_acceleration")
-        )
+        holding, gain = sensed["holding_torque"], sensed["jerk_per_torque"]
+        acceleration = sensed["lateral_acceleration"]
         more = self._jerk / gain if gain > 0.0 else math.inf
         # at the limit of acceleration, the wheel may only come back
         to_left = 0.0 if acceleration >= self._acceleration else more

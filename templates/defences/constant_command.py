@@ -5,6 +5,8 @@
 
 import math
 
+BOUNDS = ("lowest", "highest")  # first words of its parameters
+
 
 class Model:
     """A range for each command that a parameter names."""

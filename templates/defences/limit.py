@@ -2,10 +2,14 @@
 
 `lowest_NAME` and `highest_NAME` bound the command NAME; `rate_NAME` is its largest change per second, from
 the value that reached the plant in the step before.
+
+A command that is not a finite number cannot pass: the runtime puts the value of the step before in its place,
+or 0 without one, and limits that.
 """
 
 import math
 
+BOUNDS = ("lowest", "highest", "rate")  # first words of its parameters
 _UNLIMITED = {"lowest": -math.inf, "highest": math.inf, "rate": math.inf}
 
 
@@ -16,8 +20,7 @@ class Model:
         self._bounds = {}
         for key, bound in bounds.items():
             side, _, name = key.partition("_")
-            if side in _UNLIMITED:
-                self._bounds.setdefault(name, dict(_UNLIMITED))[side] = bound
+            self._bounds.setdefault(name, dict(_UNLIMITED))[side] = bound
         self._before_s = None
 
     def reset(self):

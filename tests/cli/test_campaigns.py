@@ -72,6 +72,25 @@ def test_run_prints_the_table_and_the_path_of_the_report(finished: tuple[Path, A
     assert "experiments " in said.stderr  # progress goes to stderr
 
 
+def test_run_begins_with_hazards_that_defences_cause_without_a_fault(cli: Cli, root: Path) -> None:
+    """Such a set costs more than it saves, whatever its outcomes."""
+    defence = root / "fault_library" / "defences" / "emergency_brake.yaml"
+    text = defence.read_text().replace("lowest_brake: {value: 1.0", "lowest_gas: {value: 1.0")
+    text = text.replace("highest_gas: {value: 0,", "highest_brake: {value: 0,")
+    text = text.replace("ttc < limit", "gap > limit").replace("closing <= 0", "gap > 10000")
+    defence.write_text(text)
+    campaign = root / "fault_library" / "campaigns" / "defended.yaml"
+    text = campaign.read_text()
+    campaign.write_text(text.replace(", [pedal_limit, emergency_brake]]", "]"))
+    answer = cli("run", "defended", "--out", "r", "-n", "0", "--limit", "2")
+    assert answer.code == 0
+    first, second = answer.out.splitlines()[:2]
+    assert re.fullmatch(
+        r"with emergency_brake, a hazard without any fault, by a defence: A \(H1 at \d+\.\d\d s.*\)", first
+    )
+    assert second.startswith("fault type")
+
+
 def test_table_and_seal_do_not_wait_for_stills_and_report(
     cli: Cli, run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

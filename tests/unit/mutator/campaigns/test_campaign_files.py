@@ -68,6 +68,12 @@ def test_a_campaign_is_read(tmp_path: Path) -> None:
         ("random_until_s: 5.0", "random_until_s: 1.0e+300", 13, "random_until_s"),
         ("random_until_s: 5.0", "random_until_s: .inf", 13, "random_until_s"),
         ("seed: 3", "seed: 3\nchunk: 0", 15, "chunk"),
+        (
+            "seed: 3",
+            f"seed: 3\ndefences: [none, [{'d' * 110}, {'e' * 110}]]",
+            15,
+            "2 defences whose names have 221 bytes together; expected at most 220",
+        ),
         ("seed: 3", "seed: 3\nseed: 4", 15, "duplicate key"),
     ],
 )

@@ -7,7 +7,7 @@ import pytest
 
 from mutator.comparison import defended_sets
 from mutator.comparison.defended_pairs import PairOutcome, pair_of
-from mutator.comparison.defended_sets import DefendedSet
+from mutator.comparison.defended_sets import DefendedSet, caused_golden_hazards
 from mutator.comparison.defended_sheets import prevented_share
 from mutator.model import Outcome, Status
 from mutator.store.golden_runs import GoldenRun
@@ -62,7 +62,7 @@ def test_golden_runs_with_one_more_hazard_are_told() -> None:
     """Also where the undefended run has another one."""
     undefended: Any = SimpleNamespace(golden_hazards={"S1": (H1,), "S2": (H1,)})
     defended: Any = SimpleNamespace(golden_hazards={"S1": (H1, H4), "S2": (H1,)})
-    assert [*defended_sets._caused_goldens(undefended, defended)] == ["S1"]
+    assert caused_golden_hazards(undefended, defended) == {"S1": (H4,)}
 
 
 @pytest.mark.parametrize(("sizes", "rate"), [(None, 0.5), ((30, 10), 0.75)])

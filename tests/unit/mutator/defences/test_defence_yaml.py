@@ -19,6 +19,7 @@ parameters: {offset: {value: 1, unit: m}, lowest_brake: {value: 0.5, unit: "-"}}
 acts_when: abs(error) > 2
 commands: [brake]
 """
+CROSSING = "0.5; expected at most `highest_brake`, 0.4; swap or correct them"
 
 
 def load(toycar: Workspace, text: str = FILE) -> object:
@@ -60,6 +61,9 @@ def test_the_digest_covers_file_and_model(toycar: Workspace) -> None:
         ("abs(error) > 2", "t > 2", "unknown name 't'"),
         ("lowest_brake", "lowest_brak", "nothing uses 'lowest_brak'"),
         ("lowest_brake", "lowest_gas", "nothing uses 'lowest_gas'"),
+        ("lowest_brake", "peak_brake", "nothing uses 'peak_brake'; .*lowest_brake, highest_brake"),
+        ("lowest_brake", "lowest_park_brake", "nothing uses 'lowest_park_brake'"),
+        ("lowest_brake:", "highest_brake: {value: 0.4, unit: '-'}, lowest_brake:", CROSSING),
         ("offset: {value", "gap: {value", "'gap'; expected a unique name"),
         ("commands: [brake]", "commands: [brake, horn]", "'horn'; expected one of gas, brake, wheel_turn"),
         ("commands: [brake]", "commands: []", "commands"),
@@ -71,6 +75,23 @@ def test_a_mistake_in_the_file_is_refused(toycar: Workspace, old: str, new: str,
         load(toycar, FILE.replace(old, new))
 
 
+def test_a_negative_rate_is_refused(toycar: Workspace) -> None:
+    text = FILE.replace("constant_command", "limit").replace(
+        "lowest_brake: {value: ", "rate_brake: {value: -"
+    )
+    with pytest.raises(MutatorError, match=r"d\.yaml:\d+: .*-0.5; expected a largest change per second"):
+        load(toycar, text)
+
+
+def test_a_model_without_bounds_takes_any_word(toycar: Workspace) -> None:
+    """What such a parameter means is the model's."""
+    code = "class Model:\n    def __init__(self, **any): ...\n    def reset(self): ...\n"
+    code += "    def update(self, since_s, sensed, applied): ...\n"
+    (toycar.templates / "defences" / "own.py").write_text(code)
+    load(toycar, FILE.replace("constant_command", "own").replace("lowest_brake", "peak_brake"))
+    assert toycar.defence("d").model_parameters == ("peak_brake",)
+
+
 @pytest.mark.parametrize(
     ("code", "message"),
     [
@@ -80,6 +101,11 @@ def test_a_mistake_in_the_file_is_refused(toycar: Workspace, old: str, new: str,
         ("x = open('a')\n", "the name `open`"),
         ("x = 1\n", "0 classes `Model`"),
         ("x = (\n", "not valid Python"),
+        (
+            "BOUNDS = [1]\nclass Model:\n    def reset(self): ...\n"
+            "    def update(self, since_s, sensed, applied): ...\n",
+            r"BOUNDS = \[1\]; expected first words",
+        ),
     ],
 )
 def test_a_file_that_is_no_model_is_refused(toycar: Workspace, code: str, message: str) -> None:

@@ -3,7 +3,7 @@
 import sys
 import types
 from collections.abc import Iterator
-from math import inf
+from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -210,7 +210,46 @@ def test_without_an_observation_commands_are_unchanged(toycar: Workspace) -> Non
 def test_a_range_without_bounds_changes_nothing(toycar: Workspace) -> None:
     write_model(toycar, "return {'brake': (-INFINITY, INFINITY)}".replace("INFINITY", "float('inf')"))
     fd = runtime(toycar, {"d": "parameters: {amount: {value: 1, unit: '-'}}"}, model="own")
-    assert drive(fd, [9], brake=inf) == [inf]
+    assert drive(fd, [9], brake=1e300) == [1e300]
+
+
+@pytest.mark.parametrize(("brake", "limited"), [(nan, 0.3), (inf, 0.5), (-inf, 0.3)])
+def test_a_limit_stops_what_is_no_finite_number(toycar: Workspace, brake: float, limited: float) -> None:
+    """NaN becomes the last value that reached the plant, 0.3; infinity the bound, or 0.3 where there is none.
+    This is an activation, with the largest change that a number can say.
+    """
+    fd = runtime(toycar, {"d": "parameters: {highest_brake: {value: 0.5, unit: '-'}}"}, model="limit")
+    assert drive(fd, [20], brake=0.3) == [0.3]
+    fd.observe(t=0.1, d_rel=20.0, v_ego=10.0, v_lead=5.0)
+    assert fd.command(gas=0.0, brake=brake, wheel_turn=0.0)[1] == limited
+    report = fd.report()["d"]
+    assert (report["steps"], report["changes"]) == (1, {"brake": sys.float_info.max})
+    assert report["values"] == {"brake": limited}
+
+
+@pytest.mark.parametrize("brake", [nan, inf, -inf])
+def test_without_a_finite_value_before_it_the_plant_gets_none(toycar: Workspace, brake: float) -> None:
+    """A limit of the rate has no range in its first step, yet does not let infinity pass, nor stick to it."""
+    fd = runtime(toycar, {"d": "parameters: {rate_brake: {value: 1.0, unit: '-'}}"}, model="limit")
+    assert drive(fd, [20, 20], brake=brake) == pytest.approx([0.0, 0.1 if brake == inf else 0.0])
+
+
+def test_a_defence_that_takes_over_from_no_number_begins_at_0(toycar: Workspace) -> None:
+    """Until it acts, the controller's command reaches the plant as it is."""
+    fd = runtime(toycar, {"d": f"{BRAKES.replace('lowest', 'highest')}acts_when: gap < 10"})
+    first, second = drive(fd, [20, 9], brake=nan)
+    assert isnan(first) and second == 0.0
+
+
+def test_a_division_by_a_parameter_needs_no_helper(toycar: Workspace) -> None:
+    """Only a parameter that is not 0 is safe to divide by."""
+    body = "senses: {gap: {truth: d_rel}}\n"
+    body += "derived: {a: {is: gap / two, unit: m, about: a}, b: {is: a / zero, unit: m, about: b}}\n"
+    body += "parameters: {two: {value: 2, unit: '-'}, zero: {value: 0, unit: '-'},"
+    fd = runtime(toycar, {"d": body + " lowest_brake: {value: 0.5, unit: '-'}}\nacts_when: b > 9"})
+    assert fd._decide_d(0.0, (8.0,), (), False) == (True, {"gap": 8.0, "a": 4.0, "b": inf})
+    assert "_div" in fd._decide_d.__code__.co_names
+    assert drive(fd, [8.0]) == [0.5]
 
 
 def test_no_defences_leave_the_manifest_as_it_is(toycar: Workspace) -> None:
