@@ -102,9 +102,11 @@ def stratified(runs: "pd.DataFrame", *, of: str) -> Estimate:
     types = counted(ratio.stratum_count, "fault type")
     text = f"- ({types})"
     if not math.isnan(ratio.odds_ratio):
+        is_tested = not math.isnan(ratio.p_of_equal_odds_ratios)
+        equal = f"p {ratio.p_of_equal_odds_ratios:.2g}" if is_tested else "not tested"
         text = (
             f"odds ratio {ratio.odds_ratio:.3g} ({ratio.low:.3g} to {ratio.high:.3g}; {types}; "
-            f"p {ratio.p_of_odds_ratio_1:.2g}, equal in all types: p {ratio.p_of_equal_odds_ratios:.2g})"
+            f"p {ratio.p_of_odds_ratio_1:.2g}, equal in all types: {equal})"
         )
     return Estimate(
         value=ratio.odds_ratio,
@@ -237,6 +239,8 @@ def _describe_difference(
     shares_text = f"{_describe_share(first)} against {_describe_share(second)}"
     if math.isnan(difference):
         return shares_text
+    if math.isnan(low):
+        return f"{100 * difference:+.1f} points (no interval{extra_note}): {shares_text}"
     return (
         f"{100 * difference:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f}{extra_note}): {shares_text}"
     )

@@ -10,6 +10,7 @@ instead of the clone.
 import argparse
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
@@ -83,7 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    clone, workspace = StudyClone.of_this_package(), Workspace.find()
+    clone = StudyClone.of_this_package()
+    workspace = Workspace.find(clone.root)
     docs_root = options.out / "pages" if options.small else clone.root
     campaigns = [each.small() for each in STUDY] if options.small else STUDY
     if options.check:
@@ -91,7 +93,9 @@ def _run(options: argparse.Namespace) -> int:
         return _check(check, options.out, clone)
     open_study(options.out, clone)
     choices = _SMALL_CHOICES if options.small else Choices()
-    drive_study(workspace, campaigns, options.out, workers=options.workers, choices=choices, tell=print)
+    tell = partial(print, flush=True)
+    drive_study(workspace, campaigns, options.out, workers=options.workers, choices=choices, tell=tell)
+    open_study(options.out, StudyClone.of_this_package())  # nobody checked out another commit meanwhile
     write_study(workspace, campaigns, options.out, clone, docs_root)
     print(f"written: {docs_root / RESULTS_PAGE}, tables, figure, and {options.out / DATA_SET_FOLDER}")
     return 0

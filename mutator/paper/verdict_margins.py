@@ -29,15 +29,21 @@ class VerdictMargin:
 
 
 def smallest_change(rule: ClaimRule, estimate: Estimate, measure: str) -> VerdictMargin | None:
-    """Return the smallest change of a count, with the total as it is. Of a difference or a time, the interval
-    is moved as a whole. None if no change alters the verdict.
+    """Return the smallest change of a count, with the total as it is. Of a difference, a time or a weighted
+    share, the interval is moved as a whole. None if no change alters the verdict.
     """
     verdict = rule.verdict_on(estimate)
     if estimate.n < MIN_RUNS_FOR_VERDICT and rule.some is None and rule.never is None:
         return None
-    if measure == "share" and estimate.count_with_property is not None:
-        return _change_of_count(rule, estimate.count_with_property, estimate.n, verdict)
+    count = estimate.count_with_property
+    if measure == "share" and count is not None and not _is_weighted(estimate, count):
+        return _change_of_count(rule, count, estimate.n, verdict)
     return _change_of_interval(rule, estimate, measure, verdict)
+
+
+def _is_weighted(estimate: Estimate, count: int) -> bool:
+    plain = share_with_interval(count, estimate.n)
+    return (plain.low, plain.high) != (estimate.low, estimate.high)
 
 
 def _change_of_count(rule: ClaimRule, count: int, of: int, verdict: ClaimVerdict) -> VerdictMargin | None:
@@ -89,23 +95,30 @@ def describe_observation_margin(observation: JudgedObservation) -> str:
     and a change of each claim that does not hold, or is not decided, otherwise.
     """
     needed = [claim for claim in observation.claims if claim.claim.needed]
-    margins = [(claim.number, *margin) for claim in needed for margin in _margins_of(claim)]
+    margins = [margin for claim in needed for margin in _margins_of(claim)]
     if observation.verdict is ClaimVerdict.HOLDS:
-        single_changes = [(number, margin) for number, _, margin in margins if margin]
+        single_changes = [(name, margin) for name, _, margin in margins if margin]
         if not single_changes:
             return "no single count"
-        number, margin = min(single_changes, key=lambda entry: entry[1].size)
-        return f"{number}: {margin.text}"
-    parts = [
-        f"{number}: {margin.text if margin else 'more runs'}"
-        for number, verdict, margin in margins
-        if verdict is observation.verdict
-    ]
-    return "; ".join(parts) or "all fault types of the paper"
+        name, margin = min(single_changes, key=lambda entry: entry[1].size)
+        return f"{name}: {margin.text}"
+    parts = [(name, margin) for name, verdict, margin in margins if verdict is observation.verdict]
+    texts = [f"{name}: {margin.text}" for name, margin in parts if margin]
+    if unchangeable := [name for name, margin in parts if not margin]:
+        texts.append(f"{', '.join(unchangeable)}: more runs")
+    return "; ".join(texts) or "all fault types of the paper"
 
 
-def _margins_of(claim: JudgedClaim) -> list[tuple[ClaimVerdict, VerdictMargin | None]]:
+def _margins_of(claim: JudgedClaim) -> list[tuple[str, ClaimVerdict, VerdictMargin | None]]:
+    """Return name, verdict and margin of each answer; the name is the claim's number with the group."""
     rule, measure = claim.claim.claim_rule, claim.claim.measure
     if rule is None or measure is None:
         return []
-    return [(answer.verdict, smallest_change(rule, answer.estimate, measure)) for answer in claim.answers]
+    return [
+        (
+            f"{claim.number} {answer.group}".strip(),
+            answer.verdict,
+            smallest_change(rule, answer.estimate, measure),
+        )
+        for answer in claim.answers
+    ]

@@ -179,6 +179,7 @@ def _claim_rows(campaign: str, judged: Sequence[JudgedObservation]) -> Iterator[
                     "observation": str(observation.number),
                     "observation_verdict": observation.verdict.value,
                     "claim": claim.number,
+                    "says": claim.claim.claim_text,
                     "needed": "yes" if claim.claim.needed else "",
                     "group": answer.group,
                     "estimate": answer.estimate.text,
@@ -204,7 +205,7 @@ def _seed_rows(campaign: str, frame: "pd.DataFrame") -> Iterator[Row]:
                 "campaign": campaign,
                 "share": f"{part} / {whole}",
                 "all_seeds": cell_text(share),
-                "between_seeds": f"{low} to {high}",
+                "between_seeds": f"{low} to {high}" if (low, high) != ("-", "-") else "equal in all seeds",
                 "least": f"{least} (seed {its})",
                 "largest": f"{largest} (seed {other})",
             }

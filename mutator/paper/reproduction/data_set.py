@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import re
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,6 +16,8 @@ from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_tables import HEADS, Row, StudyTables
 from mutator.results.table_columns import result_columns_of
 from mutator.results.table_reader import Results
+from mutator.statistics.results_frame import load_usable_results
+from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store.run_folder import RunFolder
 
@@ -24,20 +27,9 @@ if TYPE_CHECKING:
 MOST_BYTES = 30_000_000
 _CAMPAIGN_COLUMN = "campaign"
 _LEFT_OUT_COLUMNS = ("sentence",)  # words that follow from the other columns
+_MARKDOWN_LINK = re.compile(r"\[([^\]]+)\]\([^)]*\)")
 _SUMS_FILE = "SHA256SUMS"
-_README = """\
-# Data of the reproduction
-
-Every experiment of the campaigns in `runs.csv`, made at one commit of mutator.
-
-* `experiments.parquet` and `experiments.csv.gz` have the same rows: the results of each experiment.
-* `dictionary.csv` says what each column means, with its type and unit.
-* `runs.csv` has plan digest, seal and results digest of each campaign, and what computed it.
-* The other CSV files are the summary tables of the pages; each is also a Parquet file.
-* `LICENSE` and `CITATION.cff` say how to use and cite the data.
-
-Check the files with `sha256sum -c SHA256SUMS`. The page of the results names the digests of all files.
-"""
+_README = Path(__file__).parent / "pages" / "data-set.md"
 
 
 def write_data_set(
@@ -62,7 +54,8 @@ def write_data_set(
             _write_parquet(folder / name.replace(".csv", ".parquet"), name, tables)
     for name in ("LICENSE", "CITATION.cff"):
         shutil.copyfile(clone_root / name, folder / name)
-    write_atomic(folder / "README.md", _README.encode())
+    commits = ", ".join(sorted({row["commit"] for row in tables.rows("runs")}))
+    write_atomic(folder / "README.md", read_bounded(_README).decode().replace("{commit}", commits).encode())
     files = sorted(path.name for path in folder.iterdir())
     sums = {name: digest(read_bounded(folder / name)) for name in files}
     text = "".join(f"{sha256}  {name}\n" for name, sha256 in sums.items())
@@ -95,8 +88,15 @@ def _experiments(campaigns: Sequence[StudyCampaign], run_folders: Mapping[str, R
         rest = [name for name in results.columns if name not in _LEFT_OUT_COLUMNS]
         results = results[rest]
         results.insert(0, _CAMPAIGN_COLUMN, campaign.name)
+        results[WEIGHT_COLUMN] = results["experiment_id"].map(_weights(run_folders[campaign.name]))
         parts.append(results)
     return pd.concat(parts, ignore_index=True)
+
+
+def _weights(folder: RunFolder) -> "pd.Series":
+    """Return the weight of each usable experiment by id: 1 in a whole campaign."""
+    usable = load_usable_results(folder.path / "results.csv").set_index("experiment_id")
+    return usable.assign(**{WEIGHT_COLUMN: usable.get(WEIGHT_COLUMN, 1.0)})[WEIGHT_COLUMN]
 
 
 def _gzipped_csv(frame: "pd.DataFrame") -> bytes:
@@ -109,18 +109,20 @@ def _gzipped_csv(frame: "pd.DataFrame") -> bytes:
 
 def _dictionary(run_folders: Mapping[str, RunFolder]) -> Sheet:
     columns = {
-        column.name: (column.name, column.type, column.unit, column.about)
+        column.name: (column.name, column.type, column.unit, _MARKDOWN_LINK.sub(r"\1", column.about))
         for folder in run_folders.values()
         for column in result_columns_of(folder)
         if column.name not in _LEFT_OUT_COLUMNS
     }
     first = (_CAMPAIGN_COLUMN, "text", "", "the campaign of `runs.csv`")
+    about = "how many planned experiments it stands for; 1 in a whole campaign, empty without a usable result"
+    last = (WEIGHT_COLUMN, "number", "", about)
     return Sheet(
         name="dictionary",
         title="",
         note="",
         heads=("column", "type", "unit", "meaning"),
-        lines=(first, *columns.values()),
+        lines=(first, *columns.values(), last),
     )
 
 

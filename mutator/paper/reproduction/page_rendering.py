@@ -259,23 +259,29 @@ class StudyPages:
             for campaign in self.campaigns:
                 [row] = self.tables.rows("observations", campaign=campaign.name, observation=number)
                 cells.append(f"**{row['verdict']}** ({row['change']})")
-            rows.append((f"{number}: {title}", *cells))
-        return _markdown(("observation", *(c.title for c in self.campaigns)), rows)
+            rows.append((f"{number}: {title}", row["on_paper"] or "-", *cells))
+        return _markdown(("observation", f"{PAPER}, by its counts", *(c.title for c in self.campaigns)), rows)
+
+    def claims_list(self) -> str:
+        """Tabulate what each claim says, with its rule. A star marks those that decide an observation."""
+        rows = dict.fromkeys(
+            (_starred(row), row["says"], row["rule"]) for row in self.tables.rows("claims") if row["rule"]
+        )
+        return _markdown(("claim", "says", "rule"), list(rows))
 
     def claims_table(self, campaign: str) -> str:
-        """Tabulate the claims of one campaign: estimate, rule, verdict, and what would change it."""
+        """Tabulate the claims of one campaign: estimate, verdict, and what would change it."""
         rows = [
             (
-                row["claim"] + ("*" if row["needed"] else ""),
+                _starred(row),
                 row["group"],
                 row["estimate"],
-                row["rule"],
                 row["verdict"],
                 row["change"] or "-",
             )
             for row in self.tables.rows("claims", campaign=campaign)
         ]
-        return _markdown(("claim", "", "here", "rule", "verdict", "would change with"), rows)
+        return _markdown(("claim", "", "here", "verdict", "would change with"), rows)
 
     def seeds_table(self) -> str:
         heads = ("share", "all seeds, 95 % of runs", "95 % between seeds", "least", "largest")
@@ -319,6 +325,10 @@ class StudyPages:
         rows: list[Row] = self.tables.rows("fault_types", campaign=campaign, method=method)
         by_name = {row["fault_type"]: tally_of_row(row) for row in rows}
         return sum_tallies(by_name.get(kind, NOTHING) for kind in kinds)
+
+
+def _starred(row: Row) -> str:
+    return row["claim"] + ("*" if row["needed"] else "")
 
 
 def _joined(titles: Sequence[str]) -> str:

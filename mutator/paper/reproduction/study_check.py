@@ -44,7 +44,11 @@ class StudyCheck:
     def problems(self, out: Path | None) -> Iterator[str]:
         """Yield each difference between tables, pages and, with a study folder, its runs and data set."""
         tables = load_tables(self.docs_root / TABLES_FOLDER)
-        yield from self._page_problems(tables)
+        try:
+            yield from list(self._page_problems(tables))
+        except (KeyError, ValueError):
+            yield f"{TABLES_FOLDER}: a row or a number is missing, so that no page can be rendered"
+            return
         if out is not None:
             yield from self._run_problems(tables, out)
             for name in changed_files(out / DATA_SET_FOLDER, tables.rows("data_set")):
@@ -61,11 +65,14 @@ class StudyCheck:
 
     def _run_problems(self, tables: StudyTables, out: Path) -> Iterator[str]:
         folders = finished_folders(out, self.campaigns)
+        commit = ""
         for row in tables.rows("runs"):
-            seal = seals_of(folders[row["campaign"]]).seal
-            if seal != row["seal"]:
+            commit = row["commit"]
+            folder = folders.get(row["campaign"])
+            if folder is None:
+                yield f"{TABLES_FOLDER}/runs.csv: the study has no campaign '{row['campaign']}'"
+            elif (seal := seals_of(folder).seal) != row["seal"]:
                 yield f"{row['campaign']}: the run folder has the seal {seal}, not {row['seal']}"
-        [commit] = {row["commit"] for row in tables.rows("runs")} or {""}
         again = combined(
             [
                 *(rows_of_campaign(c, folders[c.name], self.workspace, commit) for c in self.campaigns),

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mutator._common.files import make_folder, read_json, write_json
-from mutator.errors import MutatorError
+from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_clone import StudyClone
@@ -48,9 +48,11 @@ def drive_study(
     choices: Choices,
     tell: Callable[[str], None],
 ) -> None:
-    """Drive each campaign that is not finished. `choices.limit` is that of each seed. MutatorError if one
-    stays unfinished.
+    """Drive each campaign that is not finished, also after one with a failed check or harness errors.
+    `choices.limit` is that of each seed. MutatorError at the end if one stays unfinished; at once if it is
+    interrupted, the disk is full, or a worker died.
     """
+    problems = []
     for campaign in campaigns:
         run = run_path(out, campaign)
         if RunFolder.exists(run) and RunFolder.open(run).is_finished:
@@ -59,13 +61,25 @@ def drive_study(
         tell(f"{campaign.name}: driving, in {run}")
         file = campaign.write(workspace, out)
         of_campaign = replace(choices, limit=choices.limit and choices.limit * campaign.seed_count)
-        summary = run_campaign(workspace, file, run, workers=workers, choices=of_campaign)
-        if not RunFolder.open(run).is_finished:
-            raise MutatorError(
-                f"{campaign.name} is not finished: {summary.describe_unfinished()}",
-                where=run,
-                remedy="repeat the command: it goes on where it stopped",
-            )
+        try:
+            summary = run_campaign(workspace, file, run, workers=workers, choices=of_campaign)
+        except CheckFailed as err:
+            problems.append(f"{campaign.name}: {err}")
+            tell(f"{campaign.name}: a check failed")
+            continue
+        if RunFolder.open(run).is_finished:
+            tell(f"{campaign.name}: finished, {summary.ran:,} experiments in {summary.elapsed_s:,.0f} s")
+            continue
+        problems.append(f"{campaign.name}: {summary.describe_unfinished()}")
+        tell(f"{campaign.name}: not finished")
+        if summary.interrupted or summary.problem:
+            break
+    if problems:
+        raise MutatorError(
+            f"not finished: {'. '.join(problems)}",
+            where=out,
+            remedy="repeat the command: it goes on where it stopped",
+        )
 
 
 def finished_folders(out: Path, campaigns: Sequence[StudyCampaign]) -> dict[str, RunFolder]:

@@ -44,8 +44,8 @@ HEADS: Mapping[str, tuple[str, ...]] = {
     "fault_free": ("campaign", "scenario", "changes", "hazards", "alerts"),
     "agreement": ("campaign", "fault_types", "correlation", "low", "high", "tied_here", "tied_in_paper"),
     "claims": (
-        *("campaign", "observation", "observation_verdict", "claim", "needed", "group", "estimate", "rule"),
-        *("verdict", "claim_verdict", "change"),
+        *("campaign", "observation", "observation_verdict", "claim", "says", "needed", "group", "estimate"),
+        *("rule", "verdict", "claim_verdict", "change"),
     ),
     "observations": ("campaign", "observation", "title", "verdict", "on_paper", "change"),
     "observations_by_seed": ("campaign", "seed", "observation", "verdict", "change"),

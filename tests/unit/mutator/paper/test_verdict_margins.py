@@ -47,3 +47,10 @@ def test_a_time_changes_in_seconds() -> None:
 def test_too_few_runs_have_no_change() -> None:
     few = estimate_of_share(share_with_interval(5, 9))
     assert smallest_change(ClaimRule(above=0.5), few, "share") is None
+
+
+def test_a_weighted_share_moves_with_its_interval() -> None:
+    """40 of 50 drawn runs stand for 60 %: the count alone, at 80 %, would need another change."""
+    weighted = Estimate(value=0.6, low=0.53, high=0.67, n=50, text="", count_with_property=40)
+    margin = smallest_change(ClaimRule(above=0.5), weighted, "share")
+    assert margin is not None and margin.text == "-3.0 points, -2 of 50"

@@ -46,7 +46,7 @@ def made_up_rows(campaign: StudyCampaign, commit: str = COMMIT) -> dict[str, lis
                 "needed": "yes",
                 "group": "",
             }
-            | {"estimate": "57.3 %", "rule": "above 0.5", "claim_verdict": "holds"}
+            | {"says": "Most raise none", "estimate": "57.3 %", "rule": "above 0.5", "claim_verdict": "holds"}
             | verdict
         ],
         "observations": [name | {"observation": "1", "title": "It fails.", "on_paper": "holds"} | verdict],

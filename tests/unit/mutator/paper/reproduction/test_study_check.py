@@ -149,3 +149,17 @@ def test_an_unknown_commit_is_refused(clone: StudyClone) -> None:
     find: Callable[[str], tuple[str, ...]] = clone.files_changed_since
     with pytest.raises(MutatorError, match="is not in this clone"):
         find("ef" * 20)
+
+
+@pytest.mark.parametrize("name", ["observations.csv", "runs.csv"])
+def test_a_table_without_a_row_is_found(clone: StudyClone, name: str) -> None:
+    path = clone.root / TABLES_FOLDER / name
+    path.write_text("\n".join(path.read_text().splitlines()[:-1]) + "\n")
+    assert problems(clone)
+
+
+def test_a_number_that_is_none_is_found(clone: StudyClone) -> None:
+    edit(clone.root / TABLES_FOLDER / "runs.csv", "11280", "many")
+    assert problems(clone) == [
+        f"{TABLES_FOLDER}: a row or a number is missing, so that no page can be rendered"
+    ]
