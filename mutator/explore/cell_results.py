@@ -35,13 +35,19 @@ class CellState(StrEnum):
         return self in (CellState.WITHOUT_HAZARD, CellState.BETWEEN_WITHOUT)
 
 
+MOST_TIME_MARGIN_MS = 10**9  # also of a drive without such a metric
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """The drive in which faults start: times in s. `step_s` is the target's."""
+    """The drive in which faults start: times in s. `step_s` is the target's. `time_margin_ms` says how
+    critical the golden run is at the start: the shortest of its times to other traffic, in ms.
+    """
 
     start_s: float
     end_s: float
     step_s: float
+    time_margin_ms: int = MOST_TIME_MARGIN_MS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

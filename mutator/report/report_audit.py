@@ -6,6 +6,7 @@ from mutator._common.confined_files import path_below, read_below
 from mutator.errors import MutatorError
 from mutator.report.change_since_run_before import stored_change
 from mutator.report.panel import REPORT_FOLDER
+from mutator.report.random_searches import stored_random_searches
 from mutator.report.report_builder import build_report
 from mutator.report.report_digests import STAMP_FILE
 from mutator.store.run_folder import RunFolder
@@ -29,7 +30,12 @@ def audit_report(folder: RunFolder, workspace: Workspace | None) -> tuple[int, I
 def _differences_from_rebuilt_report(
     folder: RunFolder, workspace: Workspace | None, stored: set[str]
 ) -> Iterator[MutatorError]:
-    built = build_report(folder, workspace, change=stored_change(folder)).files
+    built = build_report(
+        folder,
+        workspace,
+        change=stored_change(folder),
+        random_searches=stored_random_searches(folder),
+    ).files
     for name in sorted({*built, *stored}):
         path = path_below(folder.path / REPORT_FOLDER, name)
         if name not in built:

@@ -1,7 +1,7 @@
 """Builds the report of a run: REPORT.md, and a self-contained HTML page with others beside it.
 
-The only inputs are the run folder, the fault library, and the change against the run before, which is stored
-beside the report. Equal inputs give equal bytes.
+The only inputs are the run folder, the fault library, and what is stored beside the report: the change
+against the run before, and random searches. Equal inputs give equal bytes.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,6 +18,7 @@ from mutator.report.panel import REPORT_FOLDER, ReportPage
 from mutator.report.panels import LEADING_PANELS, build_pages, build_panels, build_study_page
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.panels.first_screen_panel import build_first_screen_panel
+from mutator.report.random_searches import RANDOM_SEARCHES_FILE, RandomSearches, find_random_searches
 from mutator.report.report_digests import inputs_digest, is_report_current, write_report_files
 from mutator.report.report_glossary import glossary_of
 from mutator.report.report_markdown_and_html import (
@@ -81,7 +82,13 @@ def write_report(run: Path, workspace: Workspace | None, *, single_file: bool = 
         write_missing_series_of_traces(folder, workspace)
     sources = inputs_digest(folder, workspace)
     change = find_change(folder, Results(run).frame())
-    built = build_report(folder, workspace, single_file=single_file, change=change)
+    built = build_report(
+        folder,
+        workspace,
+        single_file=single_file,
+        change=change,
+        random_searches=find_random_searches(folder, workspace),
+    )
     write_report_files(run, sources, built.files)
     written = _written_report(run, built.experiment_count, built.summaries)
     if built.single_file is None:
@@ -97,11 +104,13 @@ def build_report(
     *,
     single_file: bool = False,
     change: ChangeSinceRunBefore | None = None,
+    random_searches: RandomSearches | None = None,
 ) -> BuiltReport:
     """Build the report of a run folder whose tables are up to date, without writing anything. `change` is
-    that against the run before, if the report shows it.
+    that against the run before, and `random_searches` are those beside a search, if the report shows them.
     """
-    reported = replace(ReportedRun.open(folder, workspace), change=change)
+    beside = random_searches or RandomSearches()
+    reported = replace(ReportedRun.open(folder, workspace), change=change, random_searches=beside.searches)
     with computing_in_background(
         lambda: build_list_data(reported), process_count_for(len(reported.results))
     ) as wait_for_list_data:
@@ -117,6 +126,8 @@ def build_report(
     files |= {page.file_name: page_html(content, page).encode() for page in content.all_pages}
     if change:
         files |= {RUN_BEFORE_FILE: change.as_bytes()}
+    if beside.searches:
+        files |= {RANDOM_SEARCHES_FILE: beside.as_bytes()}
     if study:
         files |= {"STUDY.md": page_markdown(content, study).encode()}
     summaries = tuple(panel.summary for panel in panels if panel.summary)

@@ -16,6 +16,7 @@ from mutator.report.experiment_facts import RANK_COLUMN, UNTIMED_PATH_COLUMN, Ex
 from mutator.report.explored_planes import ExploredPlanes
 from mutator.report.fault_path_page_data import RunFaultPaths
 from mutator.report.panel import Panel
+from mutator.report.random_searches import RandomSearch
 from mutator.report.search_findings import SearchFindings
 from mutator.report.source_lines_with_outcomes import SourceLines
 from mutator.results.result_rows import ResultRow, rows_of
@@ -38,7 +39,8 @@ class ReportedRun:
     """The data that a report is made from. `results` are all experiments with a record, `frame` the usable
     ones. `faults` are those of the plan; `experiments` (the plan) and `records` are read on access. Without a
     workspace, no experiment can be rerun, and there is no study. `has_study_page`: the study has its own
-    page on these results. `change` is that against the run before. `explored` is what an exploration found.
+    page on these results. `change` is that against the run before. `explored` is what an exploration found,
+    `random_searches` what others drew at random.
     """
 
     folder: RunFolder
@@ -51,6 +53,7 @@ class ReportedRun:
     has_study_page: bool = False
     change: ChangeSinceRunBefore | None = None
     explored: ExploredPlanes | SearchFindings | None = None
+    random_searches: tuple[RandomSearch, ...] = ()
     run_fault_paths: RunFaultPaths | None = None
     source_lines: SourceLines | None = None
     faults: Mapping[str, Fault] = field(default_factory=dict)

@@ -9,12 +9,18 @@ from mutator.campaigns.exploration_section import ExploredPlane
 from mutator.explore.envelope_texts import findings_table, shortest_first
 from mutator.explore.exploration_replay import ExplorationReplay
 from mutator.explore.finding_search import Finding, FindingSearch
+from mutator.report.random_searches import RandomSearch
 
 FINDINGS_NOTE = (
     "A finding is a hazard of one fault in one scenario from one start on, with the smallest fault that "
     "reached it (the least product of magnitude and duration). Inferred durations were not driven: the "
     "experiment's longer fault reached the hazard in that time, while active. It is a bound: a smaller "
     "fault that was not tried can do the same. `mutator shrink ID` searches its smallest form."
+)
+
+
+_NO_RANDOM_SEARCH = (
+    "A search of the same faults with `--strategy random`, in the same folder of runs, is shown beside it."
 )
 
 
@@ -64,3 +70,15 @@ class SearchFindings:
         names = [finding.result.experiment_id for finding in shortest_first(self.findings, self.planes)]
         rows = [[*cells, link(name, short)] for (*cells, short), name in zip(table.rows, names, strict=True)]
         return replace(table, rows=rows)
+
+
+def describe_random_searches(counts: Sequence[int], searches: Sequence[RandomSearch]) -> str:
+    """Return the findings of a search beside those of random ones, after as many runs as all of them have."""
+    runs = min([len(counts), *(len(search.counts) for search in searches)])
+    if not searches or not runs:
+        return _NO_RANDOM_SEARCH
+    random_counts = ", ".join(f"{search.counts[runs - 1]} (`{search.name}`)" for search in searches)
+    return (
+        f"After {counted(runs, 'run')}: {counts[runs - 1]}, and drawn at random {random_counts}; dashed in "
+        "the picture."
+    )

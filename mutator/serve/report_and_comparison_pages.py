@@ -21,6 +21,7 @@ from mutator.outcomes.fault_free_runs import fault_free_alerts_note, load_fault_
 from mutator.report import report_builder
 from mutator.report.change_since_run_before import ChangeSinceRunBefore, find_change
 from mutator.report.panel import REPORT_FOLDER
+from mutator.report.random_searches import RandomSearches, stored_random_searches
 from mutator.report.report_digests import inputs_digest
 from mutator.results.table_reader import Results
 from mutator.serve.http_responses import UNTRUSTED_FILE_HEADERS, OpenFileResponse, media_type_of
@@ -85,9 +86,10 @@ class RunPages:
         folder = RunFolder.open(run)
         with self._page_lock:
             change = find_change(folder, Results(run).frame())
-            key = digest([inputs_digest(folder, self._workspace), as_json_types(change)])
+            beside = stored_random_searches(folder)  # not sought, which replays other runs
+            key = digest([inputs_digest(folder, self._workspace), as_json_types([change, beside])])
             data = self._reports.cached_or_built_file(
-                key, name, lambda: self._build_report_files(folder, change)
+                key, name, lambda: self._build_report_files(folder, change, beside)
             )
         if data is None:
             raise NotServed("no such file", expected="a file of the report")
@@ -100,7 +102,7 @@ class RunPages:
         return HTMLResponse(data)
 
     def _build_report_files(
-        self, folder: RunFolder, change: ChangeSinceRunBefore | None
+        self, folder: RunFolder, change: ChangeSinceRunBefore | None, beside: RandomSearches
     ) -> Mapping[str, bytes]:
         """Build a report. Raise MutatorError if the tables of a finished run do not follow from its records:
         the report shows them beside the run's seal.
@@ -108,7 +110,9 @@ class RunPages:
         if folder.is_finished:
             for problem in audit_tables(folder)[1]:
                 raise problem
-        return report_builder.build_report(folder, self._workspace, change=change).files
+        return report_builder.build_report(
+            folder, self._workspace, change=change, random_searches=beside
+        ).files
 
     def _build_comparison_files(self, a: Path, b: Path, addresses: ReportAddresses) -> dict[str, bytes]:
         notes = (self._golden_alerts_note(a), self._golden_alerts_note(b))

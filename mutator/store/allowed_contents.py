@@ -35,6 +35,7 @@ ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any
         "report/*.html",
         "report/made_from.json",
         "report/run_before.json",
+        "report/random_searches.json",
         "report/series/*.js",
     ),
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),

@@ -1,9 +1,10 @@
 """Explorations that are replayed from their run folders."""
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import pytest
 
@@ -114,3 +115,31 @@ def test_a_worse_controller_has_a_smaller_envelope(
     assert f"<code>{finding.experiment_id[:8]}</code>" in page
     assert mutator.compare(*reversed(runs)).findings(["smaller-envelope"]) == ()
     assert mutator.compare(runs[0], runs[0]).findings(["smaller-envelope"]) == ()
+
+
+def test_random_searches_stand_beside_a_search(exploration: Explored, tmp_path: Path) -> None:
+    """Those of the same planes in the folder of runs: the page draws them, and is built again without them.
+    A search of other faults, and one that is damaged, are not shown; a random one stands alone.
+    """
+    workspace = exploration[0]
+
+    def search(name: str, faults: list[str], **options: Any) -> mutator.Findings:
+        out = tmp_path / name
+        return mutator.search(
+            faults, "A", 1.0, out, budget=12, longest_s=3.0, campaign="small", workspace=workspace, **options
+        )
+
+    faults = ["sensor/lane/shifted", "sensor/distance/longer"]
+    found, drawn = search("search", faults), search("chance", faults, strategy="random", seed=3)
+    search("other", faults[:1], strategy="random")
+    search("damaged", faults, strategy="random", seed=4)
+    shutil.rmtree(tmp_path / "damaged" / "records")
+    report = mutator.load_run(tmp_path / "search", workspace=workspace).report(anew=True)
+    page, text = report.page.read_text(), report.markdown.read_text()
+    assert found and f"{len(found)} findings after 12 runs, drawn at random {len(drawn)}" in page
+    assert f"After 12 runs: {len(found)}, and drawn at random {len(drawn)} (`chance`)" in text
+    shutil.rmtree(tmp_path / "chance")
+    audit = mutator.verify(tmp_path / "search", report=True, workspace=workspace)
+    assert not any(check.differences for check in audit.checks)
+    alone = mutator.load_run(tmp_path / "other", workspace=workspace).report(anew=True)
+    assert "drawn at random" not in alone.page.read_text()

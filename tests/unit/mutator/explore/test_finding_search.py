@@ -135,3 +135,20 @@ def test_findings_are_counted_after_each_run() -> None:
     counts = search.finding_counts()
     assert len(counts) == sum(map(len, batches)) and counts == sorted(counts)
     assert counts[-1] == len(search.findings()) > 0
+
+
+def test_planes_that_promise_the_same_come_by_how_critical_their_golden_run_is() -> None:
+    """The first batch has each fault, scenario and start that was not seen before, the most critical first.
+    A plane without a golden run is last, and the others keep their order.
+    """
+    margins_ms = [3000 - 7 * (number * 37 % len(PLANES)) for number in range(len(PLANES))]
+    drives = [Drive(start_s=0.0, end_s=60.0, step_s=STEP_S, time_margin_ms=ms) for ms in margins_ms]
+    section = ExplorationSection(planes=PLANES, goal="find", batch=SCENARIOS)
+    chosen = [p.plane for p in FindingSearch(section=section, drives=drives, seed=1).propose()]
+    assert chosen[0] == margins_ms.index(min(margins_ms))
+    assert [margins_ms[number] for number in chosen] == sorted(margins_ms[number] for number in chosen)
+    assert {number % SCENARIOS for number in chosen} == set(range(SCENARIOS))
+    assert len({number // SCENARIOS for number in chosen}) == SCENARIOS
+    left_out = next(number for number in range(len(PLANES)) if number not in chosen)
+    drives[left_out] = Drive(start_s=0.0, end_s=0.0, step_s=1.0)
+    assert [p.plane for p in FindingSearch(section=section, drives=drives, seed=1).propose()] == chosen
