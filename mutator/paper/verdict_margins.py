@@ -35,8 +35,8 @@ def smallest_change(rule: ClaimRule, estimate: Estimate, measure: str) -> Verdic
     verdict = rule.verdict_on(estimate)
     if estimate.n < MIN_RUNS_FOR_VERDICT and rule.some is None and rule.never is None:
         return None
-    count = estimate.count_with_property
-    if measure == "share" and count is not None and not _is_weighted(estimate, count):
+    count, is_occurrence = estimate.count_with_property, rule.some is not None or rule.never is not None
+    if measure == "share" and count is not None and (is_occurrence or not _is_weighted(estimate, count)):
         return _change_of_count(rule, count, estimate.n, verdict)
     return _change_of_interval(rule, estimate, measure, verdict)
 

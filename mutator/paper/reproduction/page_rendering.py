@@ -99,9 +99,8 @@ class StudyPages:
     def versions(self) -> str:
         """Return the versions that computed the results."""
         rows = self.tables.rows("runs")
-        names = [("Python", "python"), ("mutator", "mutator")]
-        texts = [f"{label} {', '.join(sorted({row[key] for row in rows}))}" for label, key in names]
-        return "; ".join(texts)
+        python, mutator = (", ".join(sorted({row[key] for row in rows})) for key in ("python", "mutator"))
+        return f"{python} and mutator {mutator}"
 
     def data_set_table(self) -> str:
         rows = [
@@ -292,7 +291,7 @@ class StudyPages:
         return _markdown(heads, rows)
 
     def seed_verdicts_table(self) -> str:
-        """Count the seeds in which each observation holds, and name what would change each verdict."""
+        """Count the seeds in which each observation holds."""
         rows = []
         for number, title in dict.fromkeys(
             (row["observation"], row["title"]) for row in self.tables.rows("observations")
@@ -305,6 +304,18 @@ class StudyPages:
             cells = [f"{len(names)} ({', '.join(names)})" if names else "0" for names in seeds.values()]
             rows.append((f"{number}: {title}", *cells))
         return _markdown(("observation", *(f"{verdict.value} (seeds)" for verdict in ClaimVerdict)), rows)
+
+    def seed_changes_table(self) -> str:
+        """Tabulate each seed's verdicts, with what would change them."""
+        rows_by_seed: dict[str, list[Row]] = {}
+        for row in self.tables.rows("observations_by_seed"):
+            rows_by_seed.setdefault(row["seed"], []).append(row)
+        numbers = dict.fromkeys(row["observation"] for row in self.tables.rows("observations_by_seed"))
+        rows = [
+            (seed, *(f"**{row['verdict']}** ({row['change']})" for row in of_seed))
+            for seed, of_seed in rows_by_seed.items()
+        ]
+        return _markdown(("seed", *(f"observation {number}" for number in numbers)), rows)
 
     def _total_row(self, label: str, method: str, part: str) -> tuple[str, ...]:
         sources = self._tallies_by_source(method, self._scenarios(method))

@@ -54,3 +54,5 @@ def test_a_weighted_share_moves_with_its_interval() -> None:
     weighted = Estimate(value=0.6, low=0.53, high=0.67, n=50, text="", count_with_property=40)
     margin = smallest_change(ClaimRule(above=0.5), weighted, "share")
     assert margin is not None and margin.text == "-3.0 points, -2 of 50"
+    margin = smallest_change(ClaimRule(never=0.05), weighted, "share")
+    assert margin is not None and margin.text == "0 instead of 40 of 50 (-40)"
