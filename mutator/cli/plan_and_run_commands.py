@@ -236,6 +236,8 @@ def run(
         assert summary is not None  # `mutator.run` always sets it
         _print_results(terminal, finished_run, summary)
         _print_defended_runs(terminal, summary)
+        if reviewed and summary.defended:
+            terminal.print_note(_REVIEW_NOTE)
         with showing_errors(step), campaign_progress(terminal) as notify:
             # resuming an unfinished run can change the worst experiments
             if stills and summary.exit_code == 0:
@@ -259,6 +261,12 @@ def run(
         step.show(output, to_stderr=as_json)
     if summary.exit_code:
         raise typer.Exit(summary.exit_code)
+
+
+_REVIEW_NOTE = (
+    "approvals cover the lines of faults, which are the same with defences; "
+    "the defences' own lines and models are not reviewed here"
+)
 
 
 def _print_defended_runs(terminal: Terminal, summary: "Summary") -> None:

@@ -7,6 +7,7 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import as_json_types
 from mutator._common.message_text import counted
 from mutator.campaigns.plan import Plan
+from mutator.config.location_syntax import defence_at
 from mutator.errors import CheckFailed
 from mutator.review.mutant_groups import Group, groups_of_plan
 from mutator.review.review_state_and_actions import Review, ReviewState, load_review
@@ -20,8 +21,10 @@ def require_approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
     """Return the decisions that allow the plan to run (canary and probe included), for
     `mutator.store.recorded_approvals`.
 
-    CheckFailed unless every group has a valid approval.
+    With sets of defences, the same approvals hold, because a fault has the same lines there. CheckFailed
+    unless every group has a valid approval, and for a fault in a defence, whose lines no group shows.
     """
+    _check_no_fault_is_in_defence(plan)
     manifest = workspace.manifest(plan.campaign.target)
     groups = groups_of_plan(workspace, plan)
     review = load_review(workspace, manifest.name)
@@ -30,6 +33,19 @@ def require_approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
         raise _unapproved_error(workspace, plan, review, refused)
     decisions = [_approval_as_json(review, group) for group in groups]
     return {"schema": APPROVALS_SCHEMA, "target": manifest.name, "groups": decisions}
+
+
+def _check_no_fault_is_in_defence(plan: Plan) -> None:
+    faults = (experiment.fault for experiment in plan.experiments) if plan.campaign.defence_sets else ()
+    for fault in faults:
+        for injection in fault.injections:
+            if defence := defence_at(injection.location.path):
+                raise CheckFailed(
+                    f"{fault.spec} changes the defence {defence}, which the target's own tree does not have",
+                    where=plan.campaign.path,
+                    expected="with --require-reviewed, faults in the target alone: only they are shown",
+                    remedy="leave out the fault, or run the campaign without --require-reviewed",
+                )
 
 
 def _approval_as_json(review: Review, group: Group) -> dict[str, Any]:

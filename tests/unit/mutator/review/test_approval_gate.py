@@ -57,6 +57,38 @@ def test_the_run_folder_of_an_approved_plan_names_its_reviewers(
     )
 
 
+SPEC_IN_DEFENCE = """\
+schema: fault_spec/1
+module: sensor
+fault_type: weak
+about: The emergency brake does not brake.
+variants:
+  brake:
+    aim: H1
+    about: The brake fails.
+    as_described:
+      injections:
+        - at: {defence: emergency_brake, function: Model.update, entry: true}
+          model: stuck
+          unit: "1"
+          params: {target: since_s, value: 0.0}
+"""
+
+
+def test_approvals_hold_with_defences_but_not_for_faults_in_them(toycar: Workspace) -> None:
+    """A fault has the same lines in a defended tree; one in a defence is in no group's diff."""
+    plan = build_plan(toycar, "defended", Choices(limit=2))
+    decide(toycar, plan)
+    assert approval_gate.require_approvals(toycar, plan)["groups"]
+    (toycar.library / "faults" / "sensor" / "weak.yaml").write_text(SPEC_IN_DEFENCE)
+    campaign = toycar.campaign("defended")
+    text = campaign.read_text().replace("spec: sensor/silence/no_data", "spec: sensor/weak/brake")
+    campaign.write_text(text)
+    plan = build_plan(toycar, "defended")
+    with pytest.raises(CheckFailed, match="sensor/weak/brake changes the defence emergency_brake"):
+        approval_gate.require_approvals(toycar, plan)
+
+
 def test_groups_without_approval_are_named(toycar: Workspace, plan: Plan) -> None:
     groups = groups_of_plan(toycar, plan)
     missing, changed, rejected = groups[0], groups[1], groups[-1]
