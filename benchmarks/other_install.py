@@ -25,8 +25,9 @@ def install(python: str, out: Path) -> Path:
     clone = out / "clone"
     program = clone / ".venv" / "bin" / "mutator"
     if not program.exists():
-        subprocess.run(["git", "clone", "-q", "--no-hardlinks", str(ROOT), str(clone)], check=True)
-        subprocess.run(["uv", "venv", "-q", "--python", python, ".venv"], cwd=clone, check=True)
+        if not clone.exists():
+            subprocess.run(["git", "clone", "-q", "--no-hardlinks", str(ROOT), str(clone)], check=True)
+        subprocess.run(["uv", "venv", "-q", "--clear", "--python", python, ".venv"], cwd=clone, check=True)
         packages = ["-c", "constraints.txt", "-e", "."]
         environment = os.environ | {"VIRTUAL_ENV": str(clone / ".venv")}
         subprocess.run(["uv", "pip", "install", "-q", *packages], cwd=clone, env=environment, check=True)
