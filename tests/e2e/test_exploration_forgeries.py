@@ -1,12 +1,13 @@
 """Forgeries of the plan of an exploration, whose digests were all redone: records do not give it."""
 
+import random
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from mutator.model import AfterHazard
+from mutator.model import AfterHazard, Experiment, Hold, Method
 from tests.e2e.exploration_forging import (
     Explored,
     Reseal,
@@ -132,4 +133,55 @@ def test_a_forged_plan_is_found(
     exploration: Explored, explored_run: Path, reseal: Reseal, forge: Callable[[Path], None]
 ) -> None:
     """Batches, and what each experiment does, follow from earlier results."""
+    check_finds(exploration, explored_run, reseal, forge)
+
+
+def _edited(experiment: Experiment, rng: random.Random) -> Experiment:
+    """Return the experiment with something else, of all that decides its run."""
+    fault, trigger = experiment.fault, experiment.trigger
+    [injection] = fault.injections
+    params = dict(injection.params)
+    name = rng.choice([name for name in params if name != "target"])
+    changed = "noise" if name == "shape" and params[name] != "noise" else "ramp"
+    value = params[name]
+    params[name] = changed if isinstance(value, str) else (value or 0) * rng.choice((0.5, 1.001, -1)) + 1e-3
+    injections = (
+        replace(injection, params=tuple(params.items())),
+        replace(injection, params=tuple(sorted({**dict(injection.params), "target": "other"}.items()))),
+        replace(injection, location=replace(injection.location, function="Driver.other")),
+        replace(injection, model="stuck"),
+        replace(injection, where="t < 2"),
+        replace(injection, call=rng.randrange(1, 9)),
+        replace(injection, every=rng.randrange(2, 9)),
+    )
+    return rng.choice(
+        (
+            *(replace(experiment, fault=replace(fault, injections=(other,))) for other in injections),
+            replace(experiment, fault=replace(fault, value=fault.size * 1.01)),
+            replace(experiment, fault=replace(fault, unit="km")),
+            replace(experiment, fault=replace(fault, hold=Hold.TO_END)),
+            replace(experiment, trigger=replace(trigger, hold_s=(trigger.hold_s or 0.0) + 0.01)),
+            replace(experiment, trigger=replace(trigger, condition="t >= 1.01")),
+            replace(experiment, trigger=replace(trigger, armed_after_s=0.5)),
+            replace(experiment, trigger=replace(trigger, name="at 3 s")),
+            replace(experiment, seed=experiment.seed + 1),
+            replace(experiment, method=Method.RANDOM),
+        )
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100))
+def test_random_edits_of_experiments_are_found(
+    exploration: Explored, explored_run: Path, reseal: Reseal, seed: int
+) -> None:
+    """Of any experiment, constant or challenging: everything that decides its run is compared."""
+    rng = random.Random(seed)
+
+    def forge(run: Path) -> None:
+        batches = batches_of(run)
+        batch = rng.randrange(len(batches))
+        number = rng.randrange(len(batches[batch]))
+        replace_in_batch(run, batch, number, lambda experiment: _edited(experiment, rng))
+
     check_finds(exploration, explored_run, reseal, forge)

@@ -9,8 +9,10 @@ from typing import Any, Literal
 import pytest
 
 import mutator
+from mutator.audit.head_and_checks_audit import recomputed_chunks
 from mutator.explore.envelope_files import ENVELOPES_FILE
 from mutator.explore.exploration_replay import replay_exploration
+from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 from tests.e2e.exploration_forging import (
@@ -143,3 +145,24 @@ def test_random_searches_stand_beside_a_search(exploration: Explored, tmp_path: 
     assert not any(check.differences for check in audit.checks)
     alone = mutator.load_run(tmp_path / "other", workspace=workspace).report(anew=True)
     assert "drawn at random" not in alone.page.read_text()
+
+
+def test_run_json_and_plan_are_a_complete_chain(exploration: Explored, tmp_path: Path) -> None:
+    """With these alone, a stranger computes the ids, the places in the plan and the digest of the batches
+    again; an edit is found. (The plan digest also needs `campaign.yaml`, whose digest `run.json` has.)
+    """
+    genuine, stranger = RunFolder.open(exploration[1]), tmp_path / "stranger"
+    shutil.copytree(genuine.path / "plan", stranger / "plan")
+    shutil.copy(genuine.path / "run.json", stranger)
+    folder = RunFolder.open_unverified(stranger)
+    head = folder.head
+    ids = {experiment.id for experiment in plan_file.iterate_experiments(stranger)}
+    assert ids == genuine.records().keys() and len(ids) == head.experiments
+    assert recomputed_chunks(folder) == tuple(map(tuple, head.chunks))
+    assert not list(plan_file.batch_problems(stranger, head.experiments))
+    assert plan_file.last_batch_digest(stranger) == mutator.seal(genuine.path).batches_digest
+    path = stranger / plan_file.BATCHES_FILE
+    first, *others = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([first.replace("batch 1", "batch 9"), *others]))
+    [problem] = plan_file.batch_problems(stranger, head.experiments)
+    assert problem.line == 2
