@@ -50,7 +50,7 @@ def parsed() -> argparse.Namespace:
 
 def main() -> int:
     options, missed = parsed(), False
-    workspace = mutator.Workspace.find(root=options.root)
+    workspace = mutator.Workspace.find(root=options.root, templates=ROOT / "templates")
     for budget in options.budgets:
         for number, faults in enumerate(libraries(specs(workspace), options.held_out), start=1):
             figures = {
