@@ -46,7 +46,7 @@ class StudyCheck:
         tables = load_tables(self.docs_root / TABLES_FOLDER)
         try:
             yield from list(self._page_problems(tables))
-        except (KeyError, ValueError):
+        except (KeyError, TypeError, ValueError):
             yield f"{TABLES_FOLDER}: a row or a number is missing, so that no page can be rendered"
             return
         if out is not None:
@@ -55,10 +55,14 @@ class StudyCheck:
                 yield f"{out / DATA_SET_FOLDER / name}: missing, or not the file whose digest the page names"
 
     def _page_problems(self, tables: StudyTables) -> Iterator[str]:
+        missing = [n for n in (RESULTS_PAGE, DIFFERENCES_PAGE, FIGURE) if not (self.docs_root / n).is_file()]
+        yield from (f"{name}: missing" for name in missing)
+        if missing:
+            return
         study = pages_of(self.workspace, self.campaigns, tables)
-        page = read_bounded(self.docs_root / RESULTS_PAGE).decode()
+        page = read_bounded(self.docs_root / RESULTS_PAGE).decode(errors="replace")
         yield from _differences(RESULTS_PAGE, page, study.results_page())
-        page = read_bounded(self.docs_root / DIFFERENCES_PAGE).decode()
+        page = read_bounded(self.docs_root / DIFFERENCES_PAGE).decode(errors="replace")
         yield from _differences(DIFFERENCES_PAGE, page, study.with_blocks(page))
         if read_bounded(self.docs_root / FIGURE) != draw_hazard_shares(study):
             yield f"{FIGURE}: not the figure of the tables"

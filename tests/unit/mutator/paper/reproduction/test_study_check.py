@@ -158,8 +158,26 @@ def test_a_table_without_a_row_is_found(clone: StudyClone, name: str) -> None:
     assert problems(clone)
 
 
-def test_a_number_that_is_none_is_found(clone: StudyClone) -> None:
-    edit(clone.root / TABLES_FOLDER / "runs.csv", "11280", "many")
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [("runs.csv", "11280", "many"), ("fault_types.csv", "radar/chaff,480,432", "radar/chaff,480,")],
+)
+def test_a_number_that_is_none_is_found(clone: StudyClone, name: str, old: str, new: str) -> None:
+    """Also an empty cell, which is a number that the paper does not have."""
+    edit(clone.root / TABLES_FOLDER / name, old, new)
     assert problems(clone) == [
         f"{TABLES_FOLDER}: a row or a number is missing, so that no page can be rendered"
     ]
+
+
+@pytest.mark.parametrize("name", [RESULTS_PAGE, DIFFERENCES_PAGE, FIGURE])
+def test_a_missing_page_is_found(clone: StudyClone, name: str) -> None:
+    (clone.root / name).unlink()
+    assert problems(clone) == [f"{name}: missing"]
+
+
+def test_a_page_that_is_no_text_is_found(clone: StudyClone) -> None:
+    """The page is named, not the tables."""
+    (clone.root / RESULTS_PAGE).write_bytes(b"\xff")
+    [problem] = problems(clone)
+    assert problem.startswith(f"{RESULTS_PAGE}:1: not what the tables give")
