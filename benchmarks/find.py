@@ -65,8 +65,10 @@ def main() -> int:
                 print(f"{name}, {strategy}: {texts}", flush=True)
             # no finding by chance counts as one in all seeds together
             ratios = [
-                found / max(mean(values), 1 / len(values))
-                for found, values in zip((findings, dominated), zip(*by_chance, strict=True), strict=True)
+                by_results / (mean(values) or 1 / len(values))
+                for by_results, values in zip(
+                    (findings, dominated), zip(*by_chance, strict=True), strict=True
+                )
             ]
             print(f"{name}, planes / random: {ratios[0]:.2f} findings, {ratios[1]:.2f} dominated", flush=True)
             goals = GOALS.get(budget, (0.0, 0.0))

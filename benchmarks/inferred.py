@@ -2,7 +2,8 @@
 
 `python benchmarks/inferred.py RUN... [--most 200] [--seed 1]`. A cell is inferred if a shorter fault of the
 same size reached a hazard while it was active, so that the longer one must reach it at the same time. The
-cells are drawn from those of all runs together, without replacement.
+cells are drawn from those of all runs together, without replacement. The runs are of the shipped target, as
+described.
 """
 
 import argparse
@@ -12,9 +13,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import mutator
+from mutator.api.exploration_benches import experiment_builder
+from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.explore.cell_results import CellState
 from mutator.explore.lattice import Cell
 
+TARGET, READING = "openpilot", "as_described"
 GOAL_RUNS = 200
 
 
@@ -26,6 +30,7 @@ def main() -> int:
     options = parser.parse_args()
     inferred = [(e, cell) for path in options.runs for e in explored(path) for cell in inferred_cells(e)]
     drawn = random.Random(options.seed).sample(inferred, min(options.most, len(inferred)))
+    build = experiment_builder(SelectedTarget.of(None, TARGET), READING)
     wrong = 0
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -34,14 +39,11 @@ def main() -> int:
         ) as bench,
     ):
         experiments = [
-            bench.build_experiment(
-                envelope.plane.spec,
-                envelope.plane.scenario,
+            build(
+                envelope.plane,
+                envelope.magnitudes[cell[0]],
                 envelope.drive.start_s,
-                value=envelope.magnitudes[cell[0]],
-                hold_s=envelope.durations_s[cell[1]],
-                seed=envelope.plane.seed,
-                beyond=True,
+                envelope.durations_s[cell[1]],
             )
             for envelope, cell in drawn
         ]
