@@ -8,6 +8,7 @@ can be built again without them. The seal does not cover it.
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from mutator._common.confined_files import read_below
 from mutator._common.files import json_bytes, parse_json_object
@@ -46,8 +47,8 @@ class RandomSearches:
 
 
 def find_random_searches(folder: RunFolder, workspace: Workspace | None) -> RandomSearches:
-    """Return the first ten random searches of the same planes in the folder of a search, without those that
-    cannot be read; none for other runs, and for a random search itself.
+    """Return the first ten random searches in the folder of a search that have the same planes, reading and
+    sources, without those that cannot be read; none for other runs, and for a random search itself.
     """
     section = _search_of(folder)
     if section is None or section.strategy == RANDOM or workspace is None:
@@ -56,7 +57,7 @@ def find_random_searches(folder: RunFolder, workspace: Workspace | None) -> Rand
     for path in run_folders(folder.path.resolve().parent):
         with suppress(MutatorError, LookupError, TypeError, ValueError):  # the other run is damaged
             other = RunFolder.open(path)
-            if _is_counterpart(_search_of(other), section) and other.head.sources == folder.head.sources:
+            if _is_counterpart(_search_of(other), section) and _injects_the_same(other, folder):
                 replay = replay_exploration(other, workspace.manifest_of(other.head))
                 if isinstance(replay.exploration, FindingSearch) and not replay.differences:
                     counts = tuple(replay.exploration.finding_counts())
@@ -71,9 +72,15 @@ def stored_random_searches(folder: RunFolder) -> RandomSearches:
     name = f"{REPORT_FOLDER}/{RANDOM_SEARCHES_FILE}"
     try:
         stored = parse_json_object(read_below(folder.path, name), folder.path / name, _SCHEMA)
-        return typed_value_from_json(RandomSearches, {k: v for k, v in stored.items() if k != "schema"})
+        beside = typed_value_from_json(RandomSearches, {k: v for k, v in stored.items() if k != "schema"})
     except (OSError, MutatorError, TypeMisfit):
         return RandomSearches()
+    return beside if all(map(_has_counts, beside.searches)) else RandomSearches()
+
+
+def _has_counts(search: RandomSearch) -> bool:
+    """Whether the counts of a stored search can be those of one: from one run to the next, none is lost."""
+    return bool(search.counts) and all(a <= b for a, b in pairwise((0, *search.counts)))
 
 
 def _search_of(folder: RunFolder) -> ExplorationSection | None:
@@ -88,6 +95,11 @@ def _is_counterpart(other: ExplorationSection | None, section: ExplorationSectio
         and other.observe_s == section.observe_s
         and _without_seeds(other.planes) == _without_seeds(section.planes)
     )
+
+
+def _injects_the_same(other: RunFolder, folder: RunFolder) -> bool:
+    """Whether target, models and reading are the same, so that names and values mean the same faults."""
+    return (other.head.sources, other.head.reading) == (folder.head.sources, folder.head.reading)
 
 
 def _without_seeds(planes: Sequence[ExploredPlane]) -> list[ExploredPlane]:
