@@ -294,10 +294,13 @@ class GrowingPlan:
         return frozenset((row.id, row.condition) for table in tables for row in table.rows)
 
     def _sources(self) -> Mapping[str, str]:
-        names = sorted({golden.scenario for golden in self._tally.listed_goldens})
-        files = {f"scenario {name}": self._workspace.scenario(name) for name in names}
-        files |= {f"family {name}": self._workspace.family(name).path for name in self._tally.families}
-        for source, path in files.items():
+        scenarios = sorted({golden.scenario for golden in self._tally.listed_goldens})
+        families = self._tally.families
+        sources = [f"scenario {name}" for name in scenarios] + [f"family {name}" for name in families]
+        for source in sources:
             if source not in self._scenario_digests:  # the bench refuses a batch if a file was edited
-                self._scenario_digests[source] = digest(read_bounded(path))
-        return {**self._head.sources, **{source: self._scenario_digests[source] for source in files}}
+                kind, _, name = source.partition(" ")
+                workspace = self._workspace
+                file = workspace.scenario(name) if kind == "scenario" else workspace.family(name).path
+                self._scenario_digests[source] = digest(read_bounded(file))
+        return {**self._head.sources, **{source: self._scenario_digests[source] for source in sources}}

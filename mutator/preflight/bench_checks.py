@@ -140,6 +140,8 @@ class BenchChecks:
     def check_anchors(self, faults: Iterable[Fault]) -> None:
         """Raise MutatorError for a variant that does not find its statement in the target."""
         new = {fault.spec: fault for fault in faults if fault.spec not in self._variants}
+        if not new:
+            return
         if problem := anchor_problem(self.manifest, self.workspace.fault_models(), new.values()):
             raise MutatorError(
                 problem,
