@@ -20,6 +20,7 @@ from pathlib import Path
 from statistics import median
 
 import mutator
+from mutator.campaigns.shared_runs import order_for_sharing
 from mutator.config.yaml_files import load_yaml
 from mutator.config.yaml_writing import yaml_text
 from mutator.store.timings import load_timings
@@ -50,7 +51,8 @@ def ask(way: str, out: Path, count: int) -> dict[str, float]:
     if way == CAMPAIGN:
         mutator.run(campaign, out, choices=choices, engine="fork", reuse=False)
         return {}
-    experiments = list(mutator.plan(campaign, choices=choices).experiments)
+    planned = mutator.plan(campaign, choices=choices).experiments
+    experiments = [run[0] for run in order_for_sharing([[experiment] for experiment in planned])]
     if way.endswith("shuffled"):
         random.Random(1).shuffle(experiments)
     size, waiting_mb, asked_s, run_s = SIZES[way], 0.0, 0.0, 0.0
