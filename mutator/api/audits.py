@@ -10,7 +10,8 @@ from mutator._common.folder_locks import lock_run_folder
 from mutator._common.hashing import digest
 from mutator._common.message_text import counted
 from mutator._common.table_rendering import TextTable
-from mutator.api.target_and_fault_selection import WorkspaceLike, open_workspace
+from mutator.api.library_fault_audit import library_fault_check
+from mutator.api.target_and_fault_selection import SelectedTarget, WorkspaceLike, open_workspace
 from mutator.audit.defended_run_audit import defended_run_checks
 from mutator.audit.run_audit import SOURCES_CHECK, AuditCheck, run_audit_checks
 from mutator.audit.run_digests_and_seal import Seals, seals_of, unsealed_facts
@@ -218,7 +219,7 @@ def _open_workspace_if_any(workspace: WorkspaceLike) -> Workspace | None:
 def _exploration_checks(
     folder: RunFolder, workspace: Workspace | None, facts: dict[str, str]
 ) -> list[AuditCheck]:
-    """Replay an exploration; nothing for other runs, and without the library, which reads golden runs."""
+    """Replay an exploration, and build its faults again; nothing for other runs, and without the library."""
     try:
         if workspace is None or not (is_exploration(folder) or (folder.path / ENVELOPES_FILE).exists()):
             return []
@@ -234,7 +235,8 @@ def _exploration_checks(
             yield from envelope_file_problems(folder.path, replay)
 
     count = folder.head.experiments
-    return [AuditCheck.from_problems("proposals that follow from the records", count, problems())]
+    replay_check = AuditCheck.from_problems("proposals that follow from the records", count, problems())
+    return [replay_check, library_fault_check(folder, SelectedTarget(workspace, manifest), facts)]
 
 
 def _rerun_check(

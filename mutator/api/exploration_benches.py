@@ -4,27 +4,26 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, replace
-from functools import cache
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from mutator._common.argument_checks import check_whole_number
 from mutator.api.experiments import ExperimentBuilder
+from mutator.api.explored_faults import fault_builder
 from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.campaigns.exploration_section import ExplorationSection, ExploredPlane
 from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.execution.bench import Bench
 from mutator.execution.bench_opening import finishing, opened_bench
 from mutator.execution.distributor_choice import Distributor
-from mutator.explore.challengers import challenging_fault, is_challenger, name_with_form, seed_number
+from mutator.explore.challengers import name_with_form
 from mutator.explore.envelope_files import delete_envelopes, write_envelopes
 from mutator.explore.exploration import Exploration
 from mutator.explore.exploration_replay import ExplorationReplay
 from mutator.explore.exploration_run import BuildExperiment, find_drives, run_exploration
 from mutator.explore.finding_search import FindingSearch
-from mutator.explore.plane_building import explored_fault
-from mutator.model import AfterHazard, Experiment, Fault
+from mutator.model import AfterHazard, Experiment
 from mutator.store.run_progress import ProgressCallback
 from mutator.targets.stop_at_hazard_code import can_stop_at_hazard
 
@@ -99,24 +98,13 @@ def experiment_builder(selected_target: SelectedTarget, reading: str) -> BuildEx
     """Return what builds the experiments of planes."""
     builder, after_hazard = ExperimentBuilder(selected_target), after_hazard_of(selected_target)
 
-    @cache
-    def fault_of(spec: str, magnitude: float | None, seed: int) -> Fault:
-        fault = selected_target.fault(spec, value=magnitude, seed=seed, reading=reading, beyond=True)
-        return explored_fault(fault, selected_target.manifest)
-
-    def formed_fault(plane: ExploredPlane, magnitude: float | None, duration_s: float, form: str) -> Fault:
-        step_s = selected_target.manifest.step_s
-        if is_challenger(form):
-            fault = fault_of(plane.spec, magnitude, plane.seed)
-            return challenging_fault(fault, form, duration_s=duration_s, step_s=step_s, seed=plane.seed)
-        fault = fault_of(plane.spec, magnitude, plane.seed + seed_number(form))
-        return replace(fault, spec=name_with_form(plane.spec, form)) if form else fault
+    build_fault = fault_builder(selected_target, reading)
 
     def build(
         plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float, form: str = ""
     ) -> Experiment:
         return builder.build(
-            formed_fault(plane, magnitude, duration_s, form),
+            build_fault(name_with_form(plane.spec, form), magnitude, plane.seed, duration_s),
             plane.scenario,
             start_s,
             hold_s=duration_s,

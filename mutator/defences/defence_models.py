@@ -115,7 +115,10 @@ def _bounds(tree: ast.Module, path: Path) -> tuple[str, ...] | None:
     """Return a model's `BOUNDS`, the first words of parameters that it takes without naming them."""
     for node in tree.body:
         match node:
-            case ast.Assign(targets=[ast.Name(id="BOUNDS")], value=value):
+            case (
+                ast.Assign(targets=[ast.Name(id="BOUNDS")], value=ast.expr() as value)
+                | ast.AnnAssign(target=ast.Name(id="BOUNDS"), value=ast.expr() as value)
+            ):
                 items = value.elts if isinstance(value, ast.Tuple) else []
                 words = [item.value for item in items if isinstance(item, ast.Constant)]
                 names = tuple(word for word in words if isinstance(word, str) and word.isidentifier())

@@ -9,6 +9,7 @@ from mutator.model import Fault, Injection, Value
 
 FORM_MARK = "~"  # between the name of a variant and that of its form
 CHALLENGED_MODEL = "offset"  # the fault model whose error has a size with a sign
+SIZE_PARAM = "by"  # of that model
 _CHALLENGING_MODEL = "waveform"
 _HALF_PERIODS_S = (0.05, 0.16, 0.5, 1.6, 5.0)
 _GLITCH_PERIOD_S, _GLITCH_STEPS = 0.5, 2

@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from mutator.explore.challengers import CHALLENGED_MODEL
+from mutator.explore.challengers import CHALLENGED_MODEL, SIZE_PARAM
 from mutator.explore.lattice import magnitudes_between
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import Variant
+from mutator.faults.injection_specs import InjectionSpec
 from mutator.model import Fault
 from mutator.targets.manifest import TargetManifest
 
@@ -33,9 +34,13 @@ def magnitudes_by_sign(variant: Variant, points: int) -> Iterator[list[float]]:
 
 
 def can_be_challenged(variant: Variant, reading: str) -> bool:
-    """Whether all that a variant injects is a constant error with a size and a sign."""
-    injections = variant.injections_in_reading(reading)
-    return variant.draw is not None and all(i.model == CHALLENGED_MODEL for i in injections)
+    """Whether all that a variant injects is a constant error whose size, with its sign, is the value."""
+    if variant.draw is None or variant.paired_draws:
+        return False
+    return all(
+        injection.model == CHALLENGED_MODEL and _has_drawn_size(injection)
+        for injection in variant.injections_in_reading(reading)
+    )
 
 
 def has_random_numbers(variant: Variant, reading: str, models: FaultModels) -> bool:
@@ -50,6 +55,10 @@ def explored_fault(fault: Fault, manifest: TargetManifest) -> Fault:
     """
     changes = (name for name in fault.changes if not manifest.same_scenarios_by_change.get(name))
     return replace(fault, hold=None, changes=tuple(changes))
+
+
+def _has_drawn_size(injection: InjectionSpec) -> bool:
+    return any(p.name == SIZE_PARAM and not isinstance(p.value, int | float) for p in injection.params)
 
 
 def _listed_by_sign(values: list[float]) -> Iterator[list[float]]:

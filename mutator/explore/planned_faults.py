@@ -1,7 +1,7 @@
 """Whether the faults of a plan are those that their names say.
 
-The library may have changed since the run, so a plan is compared with itself: all faults of a variant inject
-the same code at the same places, and the challengers follow from its constant errors.
+A plan is compared with itself, which needs no library: all faults of a variant inject the same code at the
+same places, and the challengers follow from its constant errors.
 """
 
 import math
@@ -9,11 +9,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from mutator.errors import MutatorError
-from mutator.explore.challengers import FORM_MARK, challenging_fault, is_challenger
+from mutator.explore.challengers import FORM_MARK, SIZE_PARAM, challenging_fault, is_challenger
 from mutator.model import Experiment, Fault, Injection, Value
 
 _RELATIVE_TOLERANCE = 1e-9  # units are converted with rounding
-_SIZE_PARAM = "by"  # of the challenged fault model
 _Variant = tuple[str, int]  # its name, with that of a seed of the fault, and the seed of the runs
 
 
@@ -69,14 +68,14 @@ class PlannedFaults:
         return fault == expected if driven else _is_close(fault, expected)
 
     def _scaled(self, variant: _Variant, value: Value) -> Fault:
-        """Return a variant's constant error of another size. Parameters that differ among its faults are in
-        proportion to the value, because that is what a spec gives them, in some unit.
+        """Return a variant's constant error of another size. The size, and parameters that differ among its
+        faults, are in proportion to the value, because that is what a spec gives them, in some unit.
         """
         faults = [fault for _, fault in self._constant[variant].values()]
         first, last = faults[0], faults[-1]
         factor = _ratio(value, first.value)
         injections = (
-            _scaled_injection(injection, dict(other.params) if first is not last else None, factor)
+            _scaled_injection(injection, dict(other.params), factor)
             for injection, other in zip(first.injections, last.injections, strict=False)
         )
         return replace(first, value=value, injections=tuple(injections))
@@ -93,14 +92,14 @@ def _ratio(value: Value, other: Value) -> float:
     return value / other
 
 
-def _scaled_injection(injection: Injection, others: dict[str, Value] | None, factor: float) -> Injection:
-    """Scale what differs from the parameters of another fault; without one, the size of the error."""
+def _scaled_injection(injection: Injection, others: dict[str, Value], factor: float) -> Injection:
+    """Scale the size of the error, and what differs from the parameters of another fault."""
     return replace(
         injection,
         params=tuple(
             (name, param * factor if isinstance(param, int | float) and is_scaled else param)
             for name, param in injection.params
-            for is_scaled in [name == _SIZE_PARAM if others is None else others.get(name) != param]
+            for is_scaled in [name == SIZE_PARAM or others.get(name) != param]
         ),
     )
 

@@ -83,6 +83,17 @@ def test_a_negative_rate_is_refused(toycar: Workspace) -> None:
         load(toycar, text)
 
 
+def test_bounds_can_have_a_type(toycar: Workspace) -> None:
+    """They refuse other words as those without one do."""
+    code = 'BOUNDS: tuple[str, ...] = ("lowest",)\nclass Model:\n    def __init__(self, **any): ...\n'
+    code += "    def reset(self): ...\n    def update(self, since_s, sensed, applied): ...\n"
+    (toycar.templates / "defences" / "own.py").write_text(code)
+    text = FILE.replace("constant_command", "own")
+    load(toycar, text)
+    with pytest.raises(MutatorError, match="peak_brake"):
+        load(toycar, text.replace("lowest_brake", "peak_brake"))
+
+
 def test_a_model_without_bounds_takes_any_word(toycar: Workspace) -> None:
     """What such a parameter means is the model's."""
     code = "class Model:\n    def __init__(self, **any): ...\n    def reset(self): ...\n"
@@ -103,6 +114,11 @@ def test_a_model_without_bounds_takes_any_word(toycar: Workspace) -> None:
         ("x = (\n", "not valid Python"),
         (
             "BOUNDS = [1]\nclass Model:\n    def reset(self): ...\n"
+            "    def update(self, since_s, sensed, applied): ...\n",
+            r"BOUNDS = \[1\]; expected first words",
+        ),
+        (
+            "BOUNDS: list[int] = [1]\nclass Model:\n    def reset(self): ...\n"
             "    def update(self, since_s, sensed, applied): ...\n",
             r"BOUNDS = \[1\]; expected first words",
         ),

@@ -89,6 +89,13 @@ def test_an_edited_constant_error_does_not_excuse_its_challenger() -> None:
     assert wrong_positions([edited, *map(fault_of_size, (2.0, 3.0)), weak]) != []
 
 
+def test_sizes_that_do_not_grow_with_the_value_are_wrong() -> None:
+    """All challenged errors of a variant have the same size, whatever their names say."""
+    small = [with_params(fault_of_size(value), by=0.001) for value in (2.0, 3.0, 7.0)]
+    weak = challenging_fault(small[-1], "ramp", duration_s=4.0, step_s=0.01, seed=1)
+    assert wrong_positions([*small, weak]) == [1, 2]
+
+
 def test_the_same_value_is_the_same_fault() -> None:
     """Also of faults that are not challenged, whose sizes need not be in proportion to their values."""
     other = offset_fault("stuck")
