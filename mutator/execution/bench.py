@@ -136,9 +136,8 @@ class Bench:
         """Check and plan a batch as `run` does, for others who run it; return their session."""
         with self._calling():
             batch = self._check_batch(experiments, reason)
-            self._plan_new([e for e in batch if e.id not in self._plan.ids], reason)
-            self._begin_work()
-            session = self._begun_session()
+            self._plan_new(batch, reason)
+            session = self._begin_work()
             session.find_work()
             return session
 
@@ -206,9 +205,8 @@ class Bench:
     def _begin_batch(self, experiments: Iterable[Experiment], reason: str) -> list[Experiment]:
         """Check, plan and hand out a batch; return its experiments."""
         batch = self._check_batch(experiments, reason)
-        experiment_by_id = {experiment.id: experiment for experiment in batch}
-        self._plan_new([e for name, e in experiment_by_id.items() if name not in self._plan.ids], reason)
-        self._hand_out_missing(list(experiment_by_id.values()))
+        self._plan_new(batch, reason)
+        self._hand_out_missing(batch)
         return batch
 
     def _check_batch(self, experiments: Iterable[Experiment], reason: str) -> list[Experiment]:
@@ -227,13 +225,16 @@ class Bench:
             self._receive_record()
 
     def _receive_record(self) -> None:
+        record = self._receive()
+        self._new_records[record.experiment_id] = record
+        self._awaited.note_record(record.experiment_id)
+
+    def _receive(self) -> Record:
         try:
-            record = self._crew.receive()
+            return self._crew.receive()
         except MutatorError:
             self._stop_work()
             raise
-        self._new_records[record.experiment_id] = record
-        self._awaited.note_record(record.experiment_id)
 
     def _stop_work(self) -> None:
         """End all workers. What has finished stays."""
@@ -244,11 +245,10 @@ class Bench:
             self._awaited.stop(self._has_final_record)
 
     def _resume(self) -> None:
-        folder = RunFolder(self.path)
         for golden_run in self._plan.golden_runs:
             self._batch_check.note_scenario(golden_run.scenario, self._plan.family_of(golden_run.scenario))
         self._checks.read(self.path, self._plan.golden_runs)
-        self._session = self._open_session(folder)
+        self._session = self._open_session(RunFolder(self.path))
         self._read_records()
         self._session.note_stored(self._stored_records)
         self._progress.note_stored(self._stored_records.values())
@@ -268,9 +268,10 @@ class Bench:
     def _read_records(self) -> None:
         self._stored_records, self._new_records = RunFolder(self.path).records(), {}
 
-    def _plan_new(self, experiments: Sequence[Experiment], reason: str) -> None:
-        """Check what is new, and add it to the plan."""
+    def _plan_new(self, batch: Sequence[Experiment], reason: str) -> None:
+        """Check what is new in a batch, and add it to the plan."""
         self._check_plan_is_whole()
+        experiments = [e for name, e in {e.id: e for e in batch}.items() if name not in self._plan.ids]
         if not experiments and self._session is None:
             return
         self._checks.check_anchors(experiment.fault for experiment in experiments)
@@ -327,13 +328,13 @@ class Bench:
 
     def _hand_out_missing(self, experiments: Sequence[Experiment]) -> None:
         """Give the crew the planned experiments that have no record and do not run yet."""
-        missing = [
-            experiment
+        missing = {
+            experiment.id: experiment
             for experiment in experiments
             if not self._has_final_record(experiment.id) and experiment.id not in self._awaited.running
-        ]
+        }
         if missing:
-            self._hand_out(missing)
+            self._hand_out(list(missing.values()))
 
     def _prove(self) -> EquivalenceResult | None:
         if self._session is None:
@@ -346,40 +347,35 @@ class Bench:
         self._prove_by_crew(experiments)
         return self._session.compare_sample(folder.records())
 
-    def _begin_work(self) -> None:
-        """Before the first run of this opening: record the software and the machine."""
-        assert self._session is not None
-        reuse = self._session.reuse
-        if self._engine != REFERENCE or (reuse and reuse.searches):
+    def _begin_work(self) -> Session:
+        """Return the session, which records software and machine before the first run of this opening."""
+        session = self._begun_session()
+        if self._engine != REFERENCE or (session.reuse and session.reuse.searches):
             equivalence_check.mark_check_as_needed(self.path)
         if not self._has_begun:
-            self._session.begin_environment(f"{self._session.worker_prefix}*")
+            session.begin_environment(f"{session.worker_prefix}*")
             self._has_begun = True
+        return session
 
     def _prove_by_crew(self, experiments: Sequence[Experiment]) -> None:
         if not experiments:
             return
         self._progress.note_proof(len(experiments))
         self._hand_out(experiments, is_proof=True)
-        try:
-            for _ in experiments:
-                self._crew.receive()
-        except MutatorError:
-            self._stop_work()
-            raise
+        for _ in experiments:
+            self._receive()
         self._awaited.running.clear()
         self._progress.note_proof_ended()
 
     def _hand_out(self, experiments: Sequence[Experiment], *, is_proof: bool = False) -> None:
-        assert self._session is not None
         if self._has_crew_old_limits:  # workers have the limits with which they began
             self._receive_records(self._awaited.running)
             self._crew.use_new_limits()
             self._has_crew_old_limits = False
-        self._begin_work()
+        session = self._begin_work()
         batch = CrewBatch(
             runs=order_for_sharing(group_by_run(self._manifest, experiments)),
-            golden_digests=golden_digests(self._session.folder),
+            golden_digests=golden_digests(session.folder),
             scenario_files=dict(self._batch_check.scenario_files),
             is_proof=is_proof,
         )

@@ -27,19 +27,9 @@ Explored = tuple[Workspace, Path]  # a workspace, and the run folder of an explo
 CHECK = "proposals that follow from the records"
 
 
-def explore(workspace: Workspace, out: Path) -> None:
-    mutator.envelope(
-        "sensor/lane/shifted",
-        "A",
-        1.0,
-        out,
-        points=9,
-        longest_s=4.0,
-        observe_s=0.5,
-        validation=6,
-        campaign="small",
-        workspace=workspace,
-    )
+def explore(workspace: Workspace, out: Path, spec: str = "sensor/lane/shifted", **choices: Any) -> None:
+    sizes: dict[str, Any] = {"points": 9, "longest_s": 4.0, "observe_s": 0.5, "validation": 6}
+    mutator.envelope(spec, "A", 1.0, out, campaign="small", workspace=workspace, **(sizes | choices))
 
 
 def check_of(run: Path, workspace: Workspace) -> AuditCheck:

@@ -8,7 +8,7 @@ import pytest
 import mutator
 from mutator.audit.run_audit import AuditCheck
 from mutator.workspace import Workspace
-from tests.e2e.exploration_forging import Explored
+from tests.e2e.exploration_forging import Explored, explore
 
 CHECK = "planned faults that the library gives"
 
@@ -21,18 +21,7 @@ def equal_sizes(
     place = tmp_path_factory.mktemp("equal_sizes")
     workspace = copy_toycar(place)
     edit_distance(workspace, "by_m: distance", "by_m: 0.001")
-    mutator.envelope(
-        "sensor/distance/longer",
-        "A",
-        1.0,
-        place / "run",
-        points=6,
-        longest_s=3.0,
-        observe_s=0.5,
-        validation=6,
-        campaign="small",
-        workspace=workspace,
-    )
+    explore(workspace, place / "run", "sensor/distance/longer", points=6, longest_s=3.0)
     return workspace, place / "run"
 
 
