@@ -1,6 +1,6 @@
 """Planes as users ask for them: the magnitudes of a variant, and durations."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import replace
 
 from mutator.explore.challengers import CHALLENGED_MODEL, SIZE_PARAM
@@ -19,13 +19,13 @@ def magnitudes_by_sign(variant: Variant, points: int) -> Iterator[list[float]]:
 
     A variant that lists its values has these. Others have `points` values at equal distances of their
     logarithm, up to the largest one that the spec declares. Without any value: one empty list. ValueError for
-    listed values that are no sizes: not ascending, or with 0.
+    a listed 0, which is no size.
     """
     if variant.draw is None:
         yield []
         return
     if variant.draw.kind == "list":
-        yield from _listed_by_sign(list(dict.fromkeys(variant.draw.values)))
+        yield from _listed_by_sign(set(variant.draw.values))
         return
     low, high = variant.draw.least_and_greatest
     for largest, sign in ((high, 1), (-low, -1)):
@@ -61,12 +61,9 @@ def _has_drawn_size(injection: InjectionSpec) -> bool:
     return any(p.name == SIZE_PARAM and not isinstance(p.value, int | float) for p in injection.params)
 
 
-def _listed_by_sign(values: list[float]) -> Iterator[list[float]]:
+def _listed_by_sign(values: Set[float]) -> Iterator[list[float]]:
     for sign in (1, -1):
-        sizes = [value for value in values if value * sign > 0]
-        if sizes != sorted(sizes, key=abs):
-            raise ValueError(f"listed values that do not grow: {', '.join(f'{value:g}' for value in values)}")
-        if sizes:
+        if sizes := sorted((value for value in values if value * sign > 0), key=abs):
             yield sizes
     if 0 in values:
         raise ValueError("0 among the listed values")

@@ -235,23 +235,26 @@ def test_a_budget_that_is_spent_spoils_no_finished_exploration(toycar: Workspace
 
 
 @pytest.mark.usefixtures("kept_checks")
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [
-        ("[0.0, 2.5]", "0 among the listed values"),
-        ("[2.5, 1.0]", "listed values that do not grow: 2.5, 1"),
-    ],
-)
-def test_listed_values_that_are_no_sizes_are_refused(
-    toycar: Workspace, tmp_path: Path, values: str, text: str
-) -> None:
-    """Nothing is dropped or reordered in silence."""
+def test_a_listed_zero_is_refused(toycar: Workspace, tmp_path: Path) -> None:
+    """It is no size, and nothing is dropped in silence."""
+    _list_values_of_lane(toycar, "[0.0, 2.5]")
+    with pytest.raises(mutator.MutatorError, match="0 among the listed values"):
+        mutator.envelope(SPEC, "A", 1, tmp_path / "run", workspace=toycar)
+
+
+@pytest.mark.usefixtures("kept_checks")
+def test_values_listed_in_any_order_are_explored_by_size(toycar: Workspace, tmp_path: Path) -> None:
+    _list_values_of_lane(toycar, "[-2.5, -1.0, 1.0, 0.5, 2.5]")
+    options = {"points": 3, "longest_s": 1.0, "observe_s": 0.5, "validation": 3}
+    explored = mutator.envelope(SPEC, "A", 1, tmp_path / "run", workspace=toycar, **options)
+    assert [each.plane.magnitudes for each in explored] == [[0.5, 1.0, 2.5], [-1.0, -2.5]]
+
+
+def _list_values_of_lane(toycar: Workspace, values: str) -> None:
     path = toycar.library / "faults" / "sensor" / "lane.yaml"
     drawn = "reals_from: {first: [0.0, 0.1], step: 0.8, last: [2.4, 2.5]}\n        decimals: 2"
     assert drawn in path.read_text()
     path.write_text(path.read_text().replace(drawn, f"values: {values}"))
-    with pytest.raises(mutator.MutatorError, match=text):
-        mutator.envelope(SPEC, "A", 1, tmp_path / "run", workspace=toycar)
 
 
 @pytest.mark.usefixtures("kept_checks")
