@@ -16,6 +16,8 @@ from mutator.mutants.injected_line_syntax import place_in_target
 from mutator.mutants.probe_contract import ProbeSource, is_probe_path, report_problem
 from mutator.targets.manifest import TargetManifest
 
+MOST_WAITING_PROCESSES = 8  # golden runs that wait in a fork server
+
 
 class RunMode(StrEnum):
     """How a run was executed."""
@@ -197,7 +199,8 @@ class EngineArguments:
     """The arguments of an engine's factory.
 
     `work_folder` is an existing scratch folder. Unless `parent_pid` is None, the engine exits once that
-    process is no longer its parent. Engines with the same `secret` share files in `work_folder`.
+    process is no longer its parent. Engines with the same `secret` share files in `work_folder`. An engine
+    that forks keeps at most `most_waiting_processes` golden runs waiting, some 6 MB each.
     """
 
     manifest: TargetManifest
@@ -206,3 +209,4 @@ class EngineArguments:
     limits: Limits
     parent_pid: int | None = None
     secret: bytes = field(default_factory=partial(token_bytes, 16))
+    most_waiting_processes: int = MOST_WAITING_PROCESSES

@@ -25,6 +25,7 @@ from mutator.engines.authenticated_files import AuthenticatedFiles
 from mutator.engines.code_swap_planning import CodeSwap, plan_swap
 from mutator.engines.crashes_in_forks import CrashKinds, is_same_crash
 from mutator.engines.engine_jobs import (
+    MOST_WAITING_PROCESSES,
     EngineArguments,
     Job,
     JobResult,
@@ -80,6 +81,7 @@ class ForkEngine:
         null_mutant: Mutant,
         before_first_step: bool = False,
         secret: bytes = b"",
+        most_waiting_processes: int = MOST_WAITING_PROCESSES,
     ) -> None:
         self.reference = ReferenceEngine(manifest, work_folder, limits, parent_pid)
         self._manifest = manifest
@@ -89,6 +91,7 @@ class ForkEngine:
         self._parent_pid = parent_pid
         self._null_mutant = null_mutant
         self._forks_before_first_step = before_first_step
+        self._most_waiting_processes = most_waiting_processes
         secret = secret or token_bytes(16)
         self._observation_store = ObservationStore(self._work_folder, secret)
         self._crash_kinds = CrashKinds(AuthenticatedFiles(self._work_folder, secret))
@@ -215,7 +218,12 @@ class ForkEngine:
             self._shared_parts = self._find_shared_parts(tree_folder_of_server(home))
             try:
                 self._server = ForkServer(
-                    self._manifest, home, self._parent_pid, scenarios, self._shared_parts.as_message()
+                    self._manifest,
+                    home,
+                    self._parent_pid,
+                    scenarios,
+                    self._shared_parts.as_message(),
+                    most_waiting_processes=self._most_waiting_processes,
                 )
             except NotForkable as why:
                 self._obstacle = why
@@ -390,4 +398,5 @@ def _make_engine(arguments: EngineArguments, *, before_first_step: bool) -> Fork
         null_mutant=null,
         before_first_step=before_first_step,
         secret=arguments.secret,
+        most_waiting_processes=arguments.most_waiting_processes,
     )

@@ -21,6 +21,7 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.file_change_detection import FileChangeDetector
 from mutator._common.files import remove_folder
 from mutator.engines import pyc_files
+from mutator.engines.engine_jobs import MOST_WAITING_PROCESSES
 from mutator.engines.job_tree import JobTree
 from mutator.engines.process_endings import environment_variables_of_run, exception_in_report, wait_for_guard
 from mutator.engines.sandbox import Sandbox
@@ -29,7 +30,6 @@ from mutator.errors import ForkServerLost, NotForkable
 from mutator.targets.manifest import TargetManifest
 
 _SERVER_SCRIPT = Path(__file__).parent / "in_target" / "fork_server.py"
-_MOST_WAITING_PROCESSES = 8  # maximum number of waiting processes, because each takes about 20 MB
 # steps; a process at most this far behind is advanced, not copied: it is quickly remade
 _LOAD_REMEDY = "run `mutator check --drive`: if the golden run fails, too, no campaign can start"
 _MOST_STEPS_TO_ADVANCE = 100
@@ -131,7 +131,8 @@ class ForkServer:
     """A fork server with its waiting processes, in the new folder `scratch_folder`.
 
     In a sandbox, they can read `scenarios_folder`, and write to the folder in which `scratch_folder` is.
-    `shared_parts` are those of `fork_messages.SharedParts`.
+    `shared_parts` are those of `fork_messages.SharedParts`. At most `most_waiting_processes` (two or more)
+    wait; of more, the one that was used longest ago ends.
 
     Its tree has no bytecode, which a mutant could exchange before the server loads one more module. Raises
     NotForkable if the target cannot be loaded or has more than one thread, and ForkServerLost if the server
@@ -145,6 +146,8 @@ class ForkServer:
         parent_pid: int | None,
         scenarios_folder: Path,
         shared_parts: Sequence[Any] = (),
+        *,
+        most_waiting_processes: int = MOST_WAITING_PROCESSES,
     ) -> None:
         assert manifest.stepwise_function is not None
         self.scratch_folder = scratch_folder
@@ -152,6 +155,7 @@ class ForkServer:
         self.tree_folder = tree_folder_of_server(scratch_folder)
         self._parent_pid = parent_pid
         self._waiting_processes: list[WaitingProcess] = []
+        self._most_waiting_processes = most_waiting_processes
         self._process_group = 0  # the server's process group, once known
         pyc_files.write_files(manifest.tree.files, self.tree_folder)
         self._tree = JobTree(self.tree_folder, manifest.tree.files, {})
@@ -248,7 +252,7 @@ class ForkServer:
         arguments: list[str] | None = None,
     ) -> WaitingProcess:
         source.last_used_s = time.monotonic()
-        while len(self._waiting_processes) >= _MOST_WAITING_PROCESSES:
+        while len(self._waiting_processes) >= self._most_waiting_processes:
             oldest = min(
                 (w for w in self._waiting_processes if w is not source),
                 key=lambda waiting: waiting.last_used_s,

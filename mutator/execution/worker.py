@@ -14,7 +14,7 @@ from mutator._common.pickled_values import PickledValue
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
 from mutator.campaigns.shared_runs import run_key
-from mutator.engines.engine_jobs import EngineArguments, RunMode
+from mutator.engines.engine_jobs import MOST_WAITING_PROCESSES, EngineArguments, RunMode
 from mutator.execution.code_recording import CodeRecording, RecordingAssignment
 from mutator.execution.experiment_runner import (
     CopiedRun,
@@ -36,6 +36,8 @@ from mutator.store.golden_files import GOLDEN_FOLDER, GoldenFolders
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter
 from mutator.store.timings import ending_text
+
+_WAITING_PROCESSES_OF_BENCH = 32  # its experiments come in any order, those of a campaign by golden run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +103,9 @@ class Worker:
                 limits=self.folder.limits,
                 parent_pid=assignment.parent_pid,
                 secret=assignment.secret,
+                most_waiting_processes=_WAITING_PROCESSES_OF_BENCH
+                if self.folder.is_bench
+                else MOST_WAITING_PROCESSES,
             ),
             assignment.engine,
             golden_folder_of=lambda experiment: self._golden_folders.output_folder(

@@ -4,7 +4,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from mutator.engines.engine_jobs import Job, JobResult
+from mutator.engines.engine_jobs import MOST_WAITING_PROCESSES, Job, JobResult
 from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.fork_server_processes import ForkServer
 from mutator.limits import Limits
@@ -25,6 +25,7 @@ class Fork:
         self.toy = toy
         self.folder = folder
         self.limits = LIMITS
+        self.most_waiting_processes = MOST_WAITING_PROCESSES
         self._engine: ForkEngine | None = None
 
     @property
@@ -35,7 +36,13 @@ class Fork:
             work = self.folder / "work"
             work.mkdir()
             null = build(self.manifest, self.models, None, always_trigger())
-            self._engine = ForkEngine(self.manifest, work, self.limits, null_mutant=null)
+            self._engine = ForkEngine(
+                self.manifest,
+                work,
+                self.limits,
+                null_mutant=null,
+                most_waiting_processes=self.most_waiting_processes,
+            )
             golden = Job(name="golden", scenario=self.toy.scenario("A"), seed=7)
             self.golden = self._engine.reference.execute(golden, self.folder / "golden").out
         return self._engine

@@ -49,7 +49,7 @@ def test_starts_in_any_order_are_forked(fork: Fork, monkeypatch: pytest.MonkeyPa
     """A process that ends leaves those that it forked to one that drives on, which does not take them for
     processes of the target.
     """
-    monkeypatch.setattr(fork_server_processes, "_MOST_WAITING_PROCESSES", 3)
+    fork.most_waiting_processes = 3
     monkeypatch.setattr(fork_server_processes, "_MOST_STEPS_TO_ADVANCE", 0)
     steps = list(range(1, 101, 6))
     random.Random(1).shuffle(steps)
