@@ -95,6 +95,7 @@ class Worker:
             else None
         )
         self.add_inputs(goldens=assignment.golden_digests)
+        most_waiting = _WAITING_PROCESSES_OF_BENCH if self.folder.is_bench else MOST_WAITING_PROCESSES
         self._runners = WorkerRunners(
             EngineArguments(
                 manifest=inputs.manifest,
@@ -103,9 +104,7 @@ class Worker:
                 limits=self.folder.limits,
                 parent_pid=assignment.parent_pid,
                 secret=assignment.secret,
-                most_waiting_processes=_WAITING_PROCESSES_OF_BENCH
-                if self.folder.is_bench
-                else MOST_WAITING_PROCESSES,
+                most_waiting_processes=most_waiting,
             ),
             assignment.engine,
             golden_folder_of=lambda experiment: self._golden_folders.output_folder(
