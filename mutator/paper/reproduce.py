@@ -3,13 +3,17 @@
     python -m mutator.paper.reproduce --out DIR            # drive what is missing, then write
     python -m mutator.paper.reproduce --check [--out DIR]  # compare what is written, and say what has changed
 
+`--only NAME` drives or compares one campaign, so that machines can share the work, one after the other: all
+at the same commit, each with the tables that the one before wrote. Pages are written once all campaigns have
+rows.
+
 `--small` drives a few faults in each campaign, to try the whole way in minutes. It writes its pages into DIR
 instead of the clone.
 """
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -23,6 +27,7 @@ from mutator.paper.reproduction.study_campaigns import STUDY, StudyCampaign
 from mutator.paper.reproduction.study_check import (
     DATA_SET_FOLDER,
     StudyCheck,
+    campaigns_without_rows,
     changes_since_study,
     other_figures,
     pages_of,
@@ -34,9 +39,14 @@ from mutator.paper.reproduction.study_clone import (
     TABLES_FOLDER,
     StudyClone,
 )
-from mutator.paper.reproduction.study_driving import drive_study, finished_folders, open_study
+from mutator.paper.reproduction.study_driving import (
+    drive_study,
+    finished_folders,
+    is_driven,
+    open_study,
+)
 from mutator.paper.reproduction.study_figure import draw_hazard_shares
-from mutator.paper.reproduction.study_tables import combined
+from mutator.paper.reproduction.study_tables import StudyTables, combined, load_tables
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
@@ -47,14 +57,27 @@ _SMALL_CHOICES = Choices(
 
 def write_study(
     workspace: Workspace, campaigns: Sequence[StudyCampaign], out: Path, clone: StudyClone, docs_root: Path
-) -> None:
-    """Write tables, pages, figure and data set of a study whose campaigns are finished."""
-    folders = finished_folders(out, campaigns)
-    parts = [rows_of_campaign(each, folders[each.name], workspace, clone.commit) for each in campaigns]
-    rows = write_data_set(out / DATA_SET_FOLDER, clone.root, campaigns, folders, combined(parts))
+) -> list[str]:
+    """Write tables and data set of the campaigns that are finished in `out`, and once all campaigns have
+    rows, pages and figure. Return the names of those without.
+
+    Other campaigns keep their rows in the tables, if these were driven at the same commit.
+    """
+    folders = finished_folders(out, [each for each in campaigns if is_driven(out, each)])
+    earlier = _earlier_tables(docs_root / TABLES_FOLDER, clone.commit)
+    parts = [
+        rows_of_campaign(each, folders[each.name], workspace, clone.commit)
+        if each.name in folders
+        else earlier.of_campaigns([each.name]).rows_by_name
+        for each in campaigns
+    ]
+    so_far = combined([*parts, {"data_set": earlier.rows("data_set")}])
+    rows = write_data_set(out / DATA_SET_FOLDER, clone.root, campaigns, folders, so_far)
     tables = combined([*parts, {"data_set": rows}])
-    study = pages_of(workspace, campaigns, tables)
     tables.write(docs_root / TABLES_FOLDER)
+    if missing := campaigns_without_rows(campaigns, tables):
+        return missing
+    study = pages_of(workspace, campaigns, tables)
     differences = read_bounded(clone.root / DIFFERENCES_PAGE).decode()
     files = {
         RESULTS_PAGE: study.results_page().encode(),
@@ -64,6 +87,13 @@ def write_study(
     for name, data in files.items():
         make_folder((docs_root / name).parent)
         write_atomic(docs_root / name, data)
+    return []
+
+
+def _earlier_tables(folder: Path, commit: str) -> StudyTables:
+    """Return the tables that another machine wrote at this commit; empty ones without."""
+    tables = load_tables(folder) if folder.is_dir() else combined([])
+    return tables if {row["commit"] for row in tables.rows("runs")} <= {commit} else combined([])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,6 +101,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--out", type=Path, metavar="DIR", help="the folder of the study")
     parser.add_argument("-n", "--workers", type=int, default=usable_cores(), help="worker processes")
+    parser.add_argument(
+        "--only",
+        action="append",
+        choices=[each.name for each in STUDY],
+        help="only this campaign; can be given several times",
+    )
     parser.add_argument("--check", action="store_true", help="drive and write nothing: compare")
     parser.add_argument("--small", action="store_true", help="a few faults of each campaign, pages into DIR")
     options = parser.parse_args(arguments)
@@ -88,24 +124,33 @@ def _run(options: argparse.Namespace) -> int:
     workspace = Workspace.find(clone.root)
     docs_root = options.out / "pages" if options.small else clone.root
     campaigns = [each.small() for each in STUDY] if options.small else STUDY
+    chosen = [each for each in campaigns if each.name in options.only] if options.only else None
     if options.check:
         check = StudyCheck(docs_root=docs_root, workspace=workspace, campaigns=campaigns)
-        return _check(check, options.out, clone)
+        return _check(check, options.out, chosen, clone)
     open_study(options.out, clone)
     choices = _SMALL_CHOICES if options.small else Choices()
     tell = partial(print, flush=True)
-    drive_study(workspace, campaigns, options.out, workers=options.workers, choices=choices, tell=tell)
+    drive_study(
+        workspace, chosen or campaigns, options.out, workers=options.workers, choices=choices, tell=tell
+    )
     open_study(options.out, StudyClone.of_this_package())  # nobody checked out another commit meanwhile
-    write_study(workspace, campaigns, options.out, clone, docs_root)
-    print(f"written: {docs_root / RESULTS_PAGE}, tables, figure, and {options.out / DATA_SET_FOLDER}")
+    missing = write_study(workspace, campaigns, options.out, clone, docs_root)
+    data_set = options.out / DATA_SET_FOLDER
+    if missing:
+        print(f"written: {docs_root / TABLES_FOLDER}, {data_set}; pages need {', '.join(missing)}, too")
+    else:
+        print(f"written: {docs_root / RESULTS_PAGE}, tables, figure, and {data_set}")
     return 0
 
 
-def _check(check: StudyCheck, out: Path | None, clone: StudyClone) -> int:
+def _check(
+    check: StudyCheck, out: Path | None, chosen: Collection[StudyCampaign] | None, clone: StudyClone
+) -> int:
     problems: list[str] = []
     deciding: tuple[str, ...] = ()
     if (check.docs_root / TABLES_FOLDER).is_dir():
-        problems = list(check.problems(out))
+        problems = list(check.problems(out, chosen))
         sentence, deciding = changes_since_study(check.docs_root, clone)
     else:
         problems.append(f"{TABLES_FOLDER}: missing; the pages show older runs, until the study is driven")

@@ -23,6 +23,11 @@ def test_a_small_study_is_driven_written_and_checked(tmp_path: Path) -> None:
     """A number edited by hand and an exchanged run folder are found; another commit is refused."""
     clone, out = tmp_path / "clone", tmp_path / "study"
     subprocess.run(["git", "clone", "-q", "--no-hardlinks", str(CLONE), str(clone)], check=True)
+    first = reproduce(clone, "--out", str(out), "-n", "2", "--only", "described")
+    assert first.returncode == 0, first.stderr
+    assert "pages need coded, coded_2_75, " in first.stdout and not (out / PAGE).exists()
+    check = reproduce(clone, "--check", "--out", str(out), "--only", "described")
+    assert check.returncode == 1 and check.stdout.startswith("docs/explanation/tables: no rows of coded, ")
     done = reproduce(clone, "--out", str(out), "-n", "2")
     assert done.returncode == 0, done.stderr
     again = reproduce(clone, "--out", str(out), "-n", "2")

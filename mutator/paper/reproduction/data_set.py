@@ -41,12 +41,17 @@ def write_data_set(
 ) -> list[Row]:
     """Write the data set into a new folder; return its files with sizes and digests. MutatorError if it is
     larger than `MOST_BYTES`.
+
+    A campaign without a run folder has been driven elsewhere, and so have its files been written: their rows
+    are those of `tables`.
     """
     remove_folder(folder)
     make_folder(folder)
-    frame = _experiments(campaigns, run_folders)
-    frame.to_parquet(folder / "experiments.parquet", compression="zstd", index=False)
-    write_atomic(folder / "experiments.csv.gz", _gzipped_csv(frame))
+    for name, run_folder in run_folders.items():
+        frame = _experiments(name, run_folder)
+        parquet, csv = files_of_campaign(name)
+        frame.to_parquet(folder / parquet, compression="zstd", index=False)
+        write_atomic(folder / csv, _gzipped_csv(frame))
     write_atomic(folder / "dictionary.csv", _dictionary(run_folders).as_csv().encode())
     for name, data in tables.file_bytes().items():
         if name != "data_set.csv":
@@ -64,9 +69,18 @@ def write_data_set(
         {"file": name, "bytes": str((folder / name).stat().st_size), "sha256": sha256}
         for name, sha256 in sums.items()
     ]
+    others = [each.name for each in campaigns if each.name not in run_folders]
+    elsewhere = {file for name in others for file in files_of_campaign(name)}
+    rows += [row for row in tables.rows("data_set") if row["file"] in elsewhere]
+    rows.sort(key=lambda row: row["file"])
     if (size := sum(int(row["bytes"]) for row in rows)) > MOST_BYTES:
         raise MutatorError(f"a data set of {size:,} bytes", where=folder, expected=f"at most {MOST_BYTES:,}")
     return rows
+
+
+def files_of_campaign(name: str) -> tuple[str, str]:
+    """Return the files with the experiments of a campaign: Parquet, and compressed CSV."""
+    return f"experiments_{name}.parquet", f"experiments_{name}.csv.gz"
 
 
 def changed_files(folder: Path, rows: Sequence[Row]) -> list[str]:
@@ -79,18 +93,12 @@ def changed_files(folder: Path, rows: Sequence[Row]) -> list[str]:
     ]
 
 
-def _experiments(campaigns: Sequence[StudyCampaign], run_folders: Mapping[str, RunFolder]) -> "pd.DataFrame":
-    import pandas as pd
-
-    parts = []
-    for campaign in campaigns:
-        results = Results.up_to_date(run_folders[campaign.name].path).frame()
-        rest = [name for name in results.columns if name not in _LEFT_OUT_COLUMNS]
-        results = results[rest]
-        results.insert(0, _CAMPAIGN_COLUMN, campaign.name)
-        results[WEIGHT_COLUMN] = results["experiment_id"].map(_weights(run_folders[campaign.name]))
-        parts.append(results)
-    return pd.concat(parts, ignore_index=True)
+def _experiments(campaign: str, run_folder: RunFolder) -> "pd.DataFrame":
+    results = Results.up_to_date(run_folder.path).frame()
+    results = results[[name for name in results.columns if name not in _LEFT_OUT_COLUMNS]]
+    results.insert(0, _CAMPAIGN_COLUMN, campaign)
+    results[WEIGHT_COLUMN] = results["experiment_id"].map(_weights(run_folder))
+    return results
 
 
 def _weights(folder: RunFolder) -> "pd.Series":

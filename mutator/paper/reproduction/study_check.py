@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from mutator.audit.run_digests_and_seal import seals_of
 from mutator.errors import MutatorError
 from mutator.paper.published_numbers import load_published_numbers
 from mutator.paper.reproduction.campaign_tables import rows_of_campaign
-from mutator.paper.reproduction.data_set import changed_files
+from mutator.paper.reproduction.data_set import changed_files, files_of_campaign
 from mutator.paper.reproduction.page_rendering import StudyPages
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_clone import (
@@ -41,18 +41,29 @@ class StudyCheck:
     workspace: Workspace
     campaigns: Sequence[StudyCampaign]
 
-    def problems(self, out: Path | None) -> Iterator[str]:
-        """Yield each difference between tables, pages and, with a study folder, its runs and data set."""
+    def problems(self, out: Path | None, compared: Collection[StudyCampaign] | None = None) -> Iterator[str]:
+        """Yield each difference between tables, pages and, with a study folder, its runs and data set.
+        `compared` are the campaigns whose runs are in the folder; None: all, with the whole data set.
+        """
         tables = load_tables(self.docs_root / TABLES_FOLDER)
-        try:
-            yield from list(self._page_problems(tables))
-        except (KeyError, TypeError, ValueError):
-            yield f"{TABLES_FOLDER}: a row or a number is missing, so that no page can be rendered"
+        if missing := campaigns_without_rows(self.campaigns, tables):
+            without = ", ".join(missing)
+            yield f"{TABLES_FOLDER}: no rows of {without}; until it has them, the pages show older runs"
+        else:
+            try:
+                yield from list(self._page_problems(tables))
+            except (KeyError, TypeError, ValueError):
+                yield f"{TABLES_FOLDER}: a row or a number is missing, so that no page can be rendered"
+                return
+        if out is None:
             return
-        if out is not None:
-            yield from self._run_problems(tables, out)
-            for name in changed_files(out / DATA_SET_FOLDER, tables.rows("data_set")):
-                yield f"{out / DATA_SET_FOLDER / name}: missing, or not the file whose digest the page names"
+        yield from self._run_problems(tables, out, self.campaigns if compared is None else compared)
+        rows = tables.rows("data_set")
+        if compared is not None:
+            names = {name for campaign in compared for name in files_of_campaign(campaign.name)}
+            rows = [row for row in rows if row["file"] in names]
+        for name in changed_files(out / DATA_SET_FOLDER, rows):
+            yield f"{out / DATA_SET_FOLDER / name}: missing, or not the file whose digest the page names"
 
     def _page_problems(self, tables: StudyTables) -> Iterator[str]:
         missing = [n for n in (RESULTS_PAGE, DIFFERENCES_PAGE, FIGURE) if not (self.docs_root / n).is_file()]
@@ -67,24 +78,27 @@ class StudyCheck:
         if read_bounded(self.docs_root / FIGURE) != draw_hazard_shares(study):
             yield f"{FIGURE}: not the figure of the tables"
 
-    def _run_problems(self, tables: StudyTables, out: Path) -> Iterator[str]:
-        folders = finished_folders(out, self.campaigns)
+    def _run_problems(
+        self, tables: StudyTables, out: Path, compared: Collection[StudyCampaign]
+    ) -> Iterator[str]:
+        folders = finished_folders(out, compared)
+        known = {campaign.name for campaign in self.campaigns}
         commit = ""
         for row in tables.rows("runs"):
             commit = row["commit"]
             folder = folders.get(row["campaign"])
-            if folder is None:
+            if row["campaign"] not in known:
                 yield f"{TABLES_FOLDER}/runs.csv: the study has no campaign '{row['campaign']}'"
-            elif (seal := seals_of(folder).seal) != row["seal"]:
+            elif folder and (seal := seals_of(folder).seal) != row["seal"]:
                 yield f"{row['campaign']}: the run folder has the seal {seal}, not {row['seal']}"
-        again = combined(
-            [
-                *(rows_of_campaign(c, folders[c.name], self.workspace, commit) for c in self.campaigns),
-                {"data_set": tables.rows("data_set")},
-            ]
-        )
-        for name in tables.different_tables(again):
+        again = combined(rows_of_campaign(c, folders[c.name], self.workspace, commit) for c in compared)
+        for name in tables.of_campaigns(folders).different_tables(again):
             yield f"{TABLES_FOLDER}/{name}: not what the run folders give"
+
+
+def campaigns_without_rows(campaigns: Iterable[StudyCampaign], tables: StudyTables) -> list[str]:
+    """Return the names of campaigns that are not driven yet, as far as the tables say."""
+    return [each.name for each in campaigns if not tables.rows("runs", campaign=each.name)]
 
 
 def pages_of(workspace: Workspace, campaigns: Sequence[StudyCampaign], tables: StudyTables) -> StudyPages:

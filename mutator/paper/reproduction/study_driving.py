@@ -1,6 +1,6 @@
 """Drives the campaigns of the study, or goes on with them, in the run folders of one study folder."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +18,12 @@ STUDY_FILE, STUDY_SCHEMA = "study.json", "study/1"
 
 def run_path(out: Path, campaign: StudyCampaign) -> Path:
     return out / "runs" / campaign.name
+
+
+def is_driven(out: Path, campaign: StudyCampaign) -> bool:
+    """Return whether a study folder has a finished run of the campaign."""
+    run = run_path(out, campaign)
+    return RunFolder.exists(run) and RunFolder.open(run).is_finished
 
 
 def open_study(out: Path, clone: StudyClone) -> None:
@@ -55,7 +61,7 @@ def drive_study(
     problems = []
     for campaign in campaigns:
         run = run_path(out, campaign)
-        if RunFolder.exists(run) and RunFolder.open(run).is_finished:
+        if is_driven(out, campaign):
             tell(f"{campaign.name}: finished")
             continue
         tell(f"{campaign.name}: driving, in {run}")
@@ -82,7 +88,7 @@ def drive_study(
         )
 
 
-def finished_folders(out: Path, campaigns: Sequence[StudyCampaign]) -> dict[str, RunFolder]:
+def finished_folders(out: Path, campaigns: Iterable[StudyCampaign]) -> dict[str, RunFolder]:
     """Return the verified run folders by campaign. MutatorError if one is missing, unfinished or changed."""
     folders = {}
     for campaign in campaigns:

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -67,6 +67,15 @@ class StudyTables:
         return [
             row for row in self.rows_by_name[name] if all(row[key] == value for key, value in cells.items())
         ]
+
+    def of_campaigns(self, names: Collection[str]) -> "StudyTables":
+        """Return the rows of these campaigns, without those about the data set."""
+        return StudyTables(
+            rows_by_name={
+                name: [row for row in rows if row.get("campaign") in names]
+                for name, rows in self.rows_by_name.items()
+            }
+        )
 
     def file_bytes(self) -> dict[str, bytes]:
         """Return the files by name."""

@@ -181,3 +181,10 @@ def test_a_page_that_is_no_text_is_found(clone: StudyClone) -> None:
     (clone.root / RESULTS_PAGE).write_bytes(b"\xff")
     [problem] = problems(clone)
     assert problem.startswith(f"{RESULTS_PAGE}:1: not what the tables give")
+
+
+def test_pages_are_not_compared_before_all_campaigns_have_rows(clone: StudyClone) -> None:
+    tables = made_up_tables(clone.commit)
+    tables.of_campaigns(["described"]).write(clone.root / TABLES_FOLDER)
+    [problem] = problems(clone)
+    assert problem.startswith(f"{TABLES_FOLDER}: no rows of coded, coded_2_75, reference, ")
