@@ -29,7 +29,12 @@ class Model:
         to_left = 0.0 if acceleration >= self._acceleration else more
         to_right = 0.0 if acceleration <= -self._acceleration else more
         return {
-            "gas": (-math.inf, sensed["highest_gas"]),
-            "brake": (-math.inf, sensed["highest_brake"]),
-            "steer": (holding - to_right, holding + to_left),
+            "gas": _range(-math.inf, sensed["highest_gas"]),
+            "brake": _range(-math.inf, sensed["highest_brake"]),
+            "steer": _range(holding - to_right, holding + to_left),
         }
+
+
+def _range(low, high):
+    """A bound limits nothing if what it is calculated from is not a number."""
+    return (-math.inf if math.isnan(low) else low, math.inf if math.isnan(high) else high)

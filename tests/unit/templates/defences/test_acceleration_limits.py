@@ -40,3 +40,11 @@ def test_at_the_limit_the_wheel_only_comes_back(
 
 def test_at_rest_the_torque_is_free(limits: Any) -> None:
     assert ranges(limits, jerk_per_torque=0.0)["steer"] == (float("-inf"), float("inf"))
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
+@pytest.mark.parametrize("name", ["highest_gas", "holding_torque", "jerk_per_torque", "lateral_acceleration"])
+def test_every_bound_is_a_number_whatever_is_sensed(limits: Any, name: str, value: float) -> None:
+    """A fault in what is sensed does not end the run: the runtime refuses a range without numbers."""
+    for low, high in ranges(limits, **{name: value}).values():
+        assert low <= high
