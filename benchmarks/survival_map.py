@@ -1,22 +1,37 @@
 """Drive the campaign `map` fault by fault: what the controller survives, how large and how long.
 
-`python benchmarks/survival_map.py OUT [--only PATTERN] [--workers N]`. Each fault has a run folder below OUT,
-with all starts and scenarios of the campaign, so a map can be stopped after any fault. The same command goes
-on where it was stopped, and prints the rows of faults that are finished.
+`python benchmarks/survival_map.py OUT [--only PATTERN] [--workers N] [--table FILE]`. Each fault has a run
+folder below OUT, with all starts and scenarios of the campaign, so a map can be stopped after any fault. The
+same command goes on where it was stopped. It prints what was driven; `--table` writes a row for each fault
+and sign, as Markdown: what is survived from every start on in every scenario, and where most is not.
 """
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 
 import mutator
 from mutator._common.cpu_cores import usable_cores
-from mutator.api.exploring_campaigns import planned_exploration
-from mutator.campaigns.exploration_section import ExploredPlane
+from mutator._common.table_rendering import TextTable
+from mutator.api.exploring_campaigns import ExploringCampaign, planned_exploration
+from mutator.explore.challenges import TABLE_DURATIONS_S
+from mutator.explore.envelope_failures import first_failure, hazardous_share
+from mutator.explore.envelope_texts import fault_text, magnitude_text, start_text
 from mutator.store.plan_choices import Choices
 
 CAMPAIGN = "map"
+HEADS = (
+    "fault",
+    "survived for every duration",
+    *(f"for {duration:g} s" for duration in TABLE_DURATIONS_S),
+    "largest tried",
+    "survived for",
+    "hazard after",
+    "worst plane, hazardous cells",
+    "runs of cells",
+    "hazardous of draws",
+)
 
 
 def main() -> int:
@@ -24,54 +39,94 @@ def main() -> int:
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", default="*", help="only faults with such names")
     parser.add_argument("--workers", type=int, default=usable_cores())
+    parser.add_argument("--table", type=Path, metavar="FILE")
     options = parser.parse_args()
-    for explored in explored_faults(options.out, options.only, options.workers):
-        print(describe(explored), flush=True)
+    planned = planned_exploration(mutator.Workspace.find(), CAMPAIGN, Choices())
+    specs = dict.fromkeys(plane.spec for plane in planned.section.planes)
+    rows = []
+    for spec in (spec for spec in specs if fnmatch(spec, options.only)):
+        explored = explore_fault(planned, spec, options.out, options.workers)
+        print(describe(spec, explored), flush=True)
+        by_fault: dict[str, list[mutator.Envelope]] = {}
+        for envelope in explored:
+            by_fault.setdefault(fault_text(envelope), []).append(envelope)
+        rows += [row_of_fault(name, envelopes) for name, envelopes in by_fault.items()]
+        if options.table:
+            options.table.write_text(TextTable(heads=HEADS, rows=rows).as_markdown() + "\n")
     return 0
 
 
-def explored_faults(out: Path, pattern: str = "*", workers: int = 1) -> Iterator[mutator.Envelopes]:
-    """Yield the envelopes of each fault, driven now or before."""
-    planned = planned_exploration(mutator.Workspace.find(), CAMPAIGN, Choices())
-    section, seed = planned.section, planned.campaign.seed
-    planes: dict[str, list[ExploredPlane]] = {}
-    for plane in section.planes:
-        planes.setdefault(plane.spec, []).append(plane)
-    for spec, of_spec in planes.items():
-        if fnmatch(spec, pattern):
-            yield mutator.envelope(
-                spec,
-                list(dict.fromkeys(plane.scenario for plane in of_spec)),
-                list(dict.fromkeys(float(plane.start) for plane in of_spec)),
-                out / spec.replace("/", "-"),
-                points=len(of_spec[0].durations_s),
-                validation=section.validation,
-                observe_s=section.observe_s,
-                challengers=(),
-                campaign=CAMPAIGN,
-                seed=seed,
-                workers=workers,
-            )
+def explore_fault(planned: ExploringCampaign, spec: str, out: Path, workers: int) -> mutator.Envelopes:
+    """Return the envelopes of a fault, driven now or before."""
+    section = planned.section
+    planes = [plane for plane in section.planes if plane.spec == spec]
+    return mutator.envelope(
+        spec,
+        list(dict.fromkeys(plane.scenario for plane in planes)),
+        list(dict.fromkeys(float(plane.start) for plane in planes)),
+        out / spec.replace("/", "-"),
+        points=len(planes[0].durations_s),
+        validation=section.validation,
+        observe_s=section.observe_s,
+        challengers=(),
+        campaign=CAMPAIGN,
+        seed=planned.campaign.seed,
+        workers=workers,
+    )
 
 
-def describe(explored: mutator.Envelopes) -> str:
-    """Return how many planes and runs a fault has, and what the validations found."""
-    planes = [each for each in explored if each.was_active]
-    clean = [each for each in planes if not _failed_draws(each)]
-    draws = sum(len(validation.drawn) for each in planes for validation in each.exploration.validations)
-    runs = sum(each.run_count for each in explored)
-    cells = sum(each.exploration.map.lattice.size for each in explored)
-    name = explored[0].plane.spec if explored else explored.run.name
+def describe(spec: str, explored: mutator.Envelopes) -> str:
+    """Return how many planes and runs a fault has, and in how many planes no validation failed."""
+    planes = [envelope for envelope in explored if envelope.was_active]
+    clean = sum(not hazardous and not earlier for _, hazardous, earlier in map(_draws, planes))
     return (
-        f"{name}: {len(explored)} planes, {len(planes)} with the fault active; {runs:,} runs for {cells:,} "
-        f"cells; {draws} draws, none hazardous in {len(clean)} planes"
+        f"{spec}: {len(explored)} planes, {len(planes)} with the fault active; "
+        f"{sum(envelope.run_count for envelope in explored):,} runs, {clean} planes with clean validations"
         f"{f'; {explored.note}' if explored.note else ''}"
     )
 
 
-def _failed_draws(envelope: mutator.Envelope) -> int:
-    first = envelope.exploration.validations[:1]
-    return sum(len(envelope.exploration.failures(validation)) for validation in first)
+def row_of_fault(name: str, envelopes: Sequence[mutator.Envelope]) -> list[str]:
+    """Return what all planes of a fault and a sign survive, and the worst of them."""
+    active = [envelope for envelope in envelopes if envelope.was_active]
+    runs = sum(envelope.run_count for envelope in envelopes)
+    cells = sum(envelope.exploration.map.lattice.size for envelope in envelopes)
+    if not active:
+        return [name, *["never active"] * (len(HEADS) - 3), f"{runs:,} of {cells:,}", "-"]
+    worst = max(active, key=hazardous_share)
+    last = len(worst.magnitudes) - 1
+    longest = [envelope.longest_survived_s(last) for envelope in active]
+    times = [time for envelope in active if (time := envelope.time_to_hazard_s(last)) is not None]
+    draws = list(map(_draws, active))
+    plane = f"{worst.plane.scenario} from {start_text(worst)}, {hazardous_share(worst):.0%}"
+    return [
+        name,
+        *(_survived_text(active, duration) for duration in (None, *TABLE_DURATIONS_S)),
+        magnitude_text(worst, worst.magnitudes[last]) if worst.plane.magnitudes else "-",
+        "none" if None in longest else f"{min(each for each in longest if each is not None):g} s",
+        f"{min(times):.2f} s" if times else "-",
+        plane if any(map(first_failure, active)) else "none",
+        f"{runs:,} of {cells:,}",
+        f"{sum(h for _, h, _ in draws)} of {sum(d for d, _, _ in draws)}",
+    ]
+
+
+def _survived_text(envelopes: Sequence[mutator.Envelope], duration_s: float | None) -> str:
+    """Return the largest magnitude that all planes survive; `yes` or `no` for a fault without one."""
+    if not envelopes[0].plane.magnitudes:
+        counts = [envelope.columns_up_to(duration_s) for envelope in envelopes]
+        states = (s for e, count in zip(envelopes, counts, strict=True) for s in e.cells[0][:count])
+        return "yes" if all(state.is_without_hazard for state in states) else "no"
+    sizes = [envelope.largest_survived(duration_s) for envelope in envelopes]
+    smallest = min((size for size in sizes if size is not None), key=abs, default=None)
+    return "none" if None in sizes else magnitude_text(envelopes[0], smallest)
+
+
+def _draws(envelope: mutator.Envelope) -> tuple[int, int, int]:
+    """Return how many cells the last validation drew, how many were hazardous, and how many before."""
+    looks = envelope.exploration.validations
+    failed = [len(envelope.exploration.failures(look)) for look in looks]
+    return (len(looks[-1].drawn), failed[-1], sum(failed[:-1])) if looks else (0, 0, 0)
 
 
 if __name__ == "__main__":
