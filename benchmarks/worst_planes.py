@@ -1,7 +1,7 @@
 """Explore the worst plane of each fault of a map: with challengers, and in concrete scenarios.
 
 `python benchmarks/worst_planes.py MAP OUT [--family acc_settings] [--scenarios 20] [--first N]`. MAP is a
-run of the campaign `map`. The worst plane of a fault has the largest share of hazardous cells. It is
+folder of `survival_map.py`. The worst plane of a fault has the largest share of hazardous cells. It is
 explored again in its scenario, with challengers, and from the same start on in scenarios drawn from a
 family. Each fault has a run folder of both below OUT; the same command goes on where it was stopped. In
 the family `acc_settings`, no drive without faults has a contact; a scenario whose golden run has a hazard
@@ -32,7 +32,9 @@ def main() -> int:
     options = parser.parse_args()
     family = mutator.Workspace.find().family(options.family)
     drawn = [argument_of(s) for s in sample_scenarios(family, options.scenarios, family.sampling, SEED)]
-    for worst in worst_envelopes(mutator.load_run(options.map).envelopes)[: options.first]:
+    explored_runs = [mutator.load_run(path.parent) for path in sorted(options.map.glob("*/envelopes.json"))]
+    envelopes = [envelope for run in explored_runs for envelope in run.envelopes]
+    for worst in worst_envelopes(envelopes)[: options.first]:
         plane = worst.plane
         name = plane.spec.replace("/", "-")
         for kind, scenarios, challengers in (
