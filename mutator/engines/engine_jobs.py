@@ -16,7 +16,7 @@ from mutator.mutants.injected_line_syntax import place_in_target
 from mutator.mutants.probe_contract import ProbeSource, is_probe_path, report_problem
 from mutator.targets.manifest import TargetManifest
 
-MOST_WAITING_PROCESSES = 8  # golden runs that wait in a fork server
+MOST_WAITING_PROCESSES = 8  # of golden runs, in a fork server
 
 
 class RunMode(StrEnum):
@@ -200,7 +200,7 @@ class EngineArguments:
 
     `work_folder` is an existing scratch folder. Unless `parent_pid` is None, the engine exits once that
     process is no longer its parent. Engines with the same `secret` share files in `work_folder`. An engine
-    that forks keeps at most `most_waiting_processes` golden runs waiting, some 6 MB each.
+    that forks keeps at most `most_waiting_processes`, some 6 MB each: golden runs that wait at their steps.
     """
 
     manifest: TargetManifest

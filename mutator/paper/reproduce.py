@@ -23,6 +23,7 @@ from mutator._common.files import make_folder, write_atomic
 from mutator.errors import MutatorError
 from mutator.paper.reproduction.campaign_tables import rows_of_campaign
 from mutator.paper.reproduction.data_set import write_data_set
+from mutator.paper.reproduction.page_rendering import StudyPages
 from mutator.paper.reproduction.study_campaigns import STUDY, StudyCampaign
 from mutator.paper.reproduction.study_check import (
     DATA_SET_FOLDER,
@@ -68,32 +69,50 @@ def write_study(
     parts = [
         rows_of_campaign(each, folders[each.name], workspace, clone.commit)
         if each.name in folders
-        else earlier.of_campaigns([each.name]).rows_by_name
+        else earlier.of_campaign(each.name)
+        if earlier.rows("runs", campaign=each.name)
+        else {}
         for each in campaigns
     ]
-    so_far = combined([*parts, {"data_set": earlier.rows("data_set")}])
-    rows = write_data_set(out / DATA_SET_FOLDER, clone.root, campaigns, folders, so_far)
-    tables = combined([*parts, {"data_set": rows}])
+    try:
+        so_far = combined([*parts, {"data_set": earlier.rows("data_set")}])
+        rows = write_data_set(out / DATA_SET_FOLDER, clone.root, campaigns, folders, so_far)
+        tables = combined([*parts, {"data_set": rows}])
+        missing = campaigns_without_rows(campaigns, tables)
+        pages = {} if missing else _rendered_pages(pages_of(workspace, campaigns, tables), clone)
+    except (KeyError, TypeError, ValueError) as err:
+        if not earlier.rows("runs"):
+            raise
+        raise MutatorError(
+            f"rows of other machines with a gap or a wrong number ({err})",
+            where=docs_root / TABLES_FOLDER,
+            remedy="restore the tables that they wrote",
+        ) from err
     tables.write(docs_root / TABLES_FOLDER)
-    if missing := campaigns_without_rows(campaigns, tables):
-        return missing
-    study = pages_of(workspace, campaigns, tables)
+    for name, data in pages.items():
+        make_folder((docs_root / name).parent)
+        write_atomic(docs_root / name, data)
+    return missing
+
+
+def _earlier_tables(folder: Path, commit: str) -> StudyTables:
+    """Return the tables that other machines wrote at this commit; empty ones without, also if a file is
+    missing or broken.
+    """
+    try:
+        tables = load_tables(folder)
+    except MutatorError:
+        return combined([])
+    return tables if {row["commit"] for row in tables.rows("runs")} == {commit} else combined([])
+
+
+def _rendered_pages(study: StudyPages, clone: StudyClone) -> dict[str, bytes]:
     differences = read_bounded(clone.root / DIFFERENCES_PAGE).decode()
-    files = {
+    return {
         RESULTS_PAGE: study.results_page().encode(),
         DIFFERENCES_PAGE: study.with_blocks(differences).encode(),
         FIGURE: draw_hazard_shares(study),
     }
-    for name, data in files.items():
-        make_folder((docs_root / name).parent)
-        write_atomic(docs_root / name, data)
-    return []
-
-
-def _earlier_tables(folder: Path, commit: str) -> StudyTables:
-    """Return the tables that another machine wrote at this commit; empty ones without."""
-    tables = load_tables(folder) if folder.is_dir() else combined([])
-    return tables if {row["commit"] for row in tables.rows("runs")} <= {commit} else combined([])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -36,5 +36,5 @@ class Model:
 
 
 def _range(low, high):
-    """A bound limits nothing if what it is calculated from is not a number."""
-    return (-math.inf if math.isnan(low) else low, math.inf if math.isnan(high) else high)
+    """Return the range; a bound limits nothing if what gives it is not a number, or infinite."""
+    return (low if low < math.inf else -math.inf, high if high > -math.inf else math.inf)

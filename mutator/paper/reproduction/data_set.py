@@ -4,12 +4,12 @@ import gzip
 import io
 import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.files import make_folder, remove_folder, write_atomic
+from mutator._common.files import make_folder, write_atomic
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
@@ -42,17 +42,20 @@ def write_data_set(
     """Write the data set into a new folder; return its files with sizes and digests. MutatorError if it is
     larger than `MOST_BYTES`.
 
-    A campaign without a run folder has been driven elsewhere, and so have its files been written: their rows
-    are those of `tables`.
+    A campaign without a run folder has been driven elsewhere: the rows of its files are those of `tables`,
+    and files that were brought from there stay.
     """
-    remove_folder(folder)
+    elsewhere = files_of_campaigns(each for each in campaigns if each.name not in run_folders)
     make_folder(folder)
+    for path in folder.iterdir():
+        if path.name not in elsewhere:
+            path.unlink()
     for name, run_folder in run_folders.items():
         frame = _experiments(name, run_folder)
-        parquet, csv = files_of_campaign(name)
+        parquet, csv, dictionary = _files_of_campaign(name)
         frame.to_parquet(folder / parquet, compression="zstd", index=False)
         write_atomic(folder / csv, _gzipped_csv(frame))
-    write_atomic(folder / "dictionary.csv", _dictionary(run_folders).as_csv().encode())
+        write_atomic(folder / dictionary, _dictionary(run_folder).as_csv().encode())
     for name, data in tables.file_bytes().items():
         if name != "data_set.csv":
             write_atomic(folder / name, data)
@@ -61,26 +64,29 @@ def write_data_set(
         shutil.copyfile(clone_root / name, folder / name)
     commits = ", ".join(sorted({row["commit"] for row in tables.rows("runs")}))
     write_atomic(folder / "README.md", read_bounded(_README).decode().replace("{commit}", commits).encode())
-    files = sorted(path.name for path in folder.iterdir())
-    sums = {name: digest(read_bounded(folder / name)) for name in files}
-    text = "".join(f"{sha256}  {name}\n" for name, sha256 in sums.items())
-    write_atomic(folder / _SUMS_FILE, text.encode())
-    rows: list[Row] = [
-        {"file": name, "bytes": str((folder / name).stat().st_size), "sha256": sha256}
-        for name, sha256 in sums.items()
-    ]
-    others = [each.name for each in campaigns if each.name not in run_folders]
-    elsewhere = {file for name in others for file in files_of_campaign(name)}
+    rows = [_row(path) for path in folder.iterdir() if path.name not in elsewhere]
     rows += [row for row in tables.rows("data_set") if row["file"] in elsewhere]
     rows.sort(key=lambda row: row["file"])
+    text = "".join(f"{row['sha256']}  {row['file']}\n" for row in rows)
+    write_atomic(folder / _SUMS_FILE, text.encode())
     if (size := sum(int(row["bytes"]) for row in rows)) > MOST_BYTES:
         raise MutatorError(f"a data set of {size:,} bytes", where=folder, expected=f"at most {MOST_BYTES:,}")
     return rows
 
 
-def files_of_campaign(name: str) -> tuple[str, str]:
-    """Return the files with the experiments of a campaign: Parquet, and compressed CSV."""
-    return f"experiments_{name}.parquet", f"experiments_{name}.csv.gz"
+def _row(path: Path) -> Row:
+    data = read_bounded(path)
+    return {"file": path.name, "bytes": str(len(data)), "sha256": digest(data)}
+
+
+def files_of_campaigns(campaigns: Iterable[StudyCampaign]) -> set[str]:
+    """Return the files that only these campaigns give."""
+    return {name for campaign in campaigns for name in _files_of_campaign(campaign.name)}
+
+
+def _files_of_campaign(name: str) -> tuple[str, str, str]:
+    """Return the files of a campaign: its experiments as Parquet and as compressed CSV, and their columns."""
+    return f"experiments_{name}.parquet", f"experiments_{name}.csv.gz", f"dictionary_{name}.csv"
 
 
 def changed_files(folder: Path, rows: Sequence[Row]) -> list[str]:
@@ -115,13 +121,12 @@ def _gzipped_csv(frame: "pd.DataFrame") -> bytes:
     return out.getvalue()
 
 
-def _dictionary(run_folders: Mapping[str, RunFolder]) -> Sheet:
-    columns = {
-        column.name: (column.name, column.type, column.unit, _MARKDOWN_LINK.sub(r"\1", column.about))
-        for folder in run_folders.values()
-        for column in result_columns_of(folder)
+def _dictionary(run_folder: RunFolder) -> Sheet:
+    columns = [
+        (column.name, column.type, column.unit, _MARKDOWN_LINK.sub(r"\1", column.about))
+        for column in result_columns_of(run_folder)
         if column.name not in _LEFT_OUT_COLUMNS
-    }
+    ]
     first = (_CAMPAIGN_COLUMN, "text", "", "the campaign of `runs.csv`")
     about = "how many planned experiments it stands for; 1 in a whole campaign, empty without a usable result"
     last = (WEIGHT_COLUMN, "number", "", about)
@@ -130,7 +135,7 @@ def _dictionary(run_folders: Mapping[str, RunFolder]) -> Sheet:
         title="",
         note="",
         heads=("column", "type", "unit", "meaning"),
-        lines=(first, *columns.values(), last),
+        lines=(first, *columns, last),
     )
 
 

@@ -12,7 +12,7 @@ from mutator.audit.run_digests_and_seal import seals_of
 from mutator.errors import MutatorError
 from mutator.paper.published_numbers import load_published_numbers
 from mutator.paper.reproduction.campaign_tables import rows_of_campaign
-from mutator.paper.reproduction.data_set import changed_files, files_of_campaign
+from mutator.paper.reproduction.data_set import changed_files, files_of_campaigns
 from mutator.paper.reproduction.page_rendering import StudyPages
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_clone import (
@@ -43,7 +43,7 @@ class StudyCheck:
 
     def problems(self, out: Path | None, compared: Collection[StudyCampaign] | None = None) -> Iterator[str]:
         """Yield each difference between tables, pages and, with a study folder, its runs and data set.
-        `compared` are the campaigns whose runs are in the folder; None: all, with the whole data set.
+        `compared` are the campaigns whose runs and files of the data set are in the folder; None: all.
         """
         tables = load_tables(self.docs_root / TABLES_FOLDER)
         if missing := campaigns_without_rows(self.campaigns, tables):
@@ -57,11 +57,12 @@ class StudyCheck:
                 return
         if out is None:
             return
-        yield from self._run_problems(tables, out, self.campaigns if compared is None else compared)
-        rows = tables.rows("data_set")
-        if compared is not None:
-            names = {name for campaign in compared for name in files_of_campaign(campaign.name)}
-            rows = [row for row in rows if row["file"] in names]
+        compared = self.campaigns if compared is None else compared
+        yield from self._run_problems(tables, out, compared)
+        elsewhere = files_of_campaigns(each for each in self.campaigns if each not in compared)
+        rows = [row for row in tables.rows("data_set") if row["file"] not in elsewhere]
+        for name in files_of_campaigns(compared) - {row["file"] for row in rows}:
+            yield f"{TABLES_FOLDER}/data_set.csv: no row of {name}"
         for name in changed_files(out / DATA_SET_FOLDER, rows):
             yield f"{out / DATA_SET_FOLDER / name}: missing, or not the file whose digest the page names"
 
@@ -92,7 +93,7 @@ class StudyCheck:
             elif folder and (seal := seals_of(folder).seal) != row["seal"]:
                 yield f"{row['campaign']}: the run folder has the seal {seal}, not {row['seal']}"
         again = combined(rows_of_campaign(c, folders[c.name], self.workspace, commit) for c in compared)
-        for name in tables.of_campaigns(folders).different_tables(again):
+        for name in tables.without_campaigns(known - set(folders)).different_tables(again):
             yield f"{TABLES_FOLDER}/{name}: not what the run folders give"
 
 

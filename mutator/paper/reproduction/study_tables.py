@@ -54,6 +54,7 @@ HEADS: Mapping[str, tuple[str, ...]] = {
 }
 MOST_BYTES = 300_000  # of all tables, which are committed
 _MOST_NAMED = 3
+_RUNS_FILE = "runs.csv"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,12 +69,19 @@ class StudyTables:
             row for row in self.rows_by_name[name] if all(row[key] == value for key, value in cells.items())
         ]
 
-    def of_campaigns(self, names: Collection[str]) -> "StudyTables":
-        """Return the rows of these campaigns, without those about the data set."""
+    def of_campaign(self, name: str) -> Mapping[str, Sequence[Row]]:
+        """Return the rows of a campaign by table, without those about the data set."""
+        return {
+            table: [row for row in rows if row.get("campaign") == name]
+            for table, rows in self.rows_by_name.items()
+        }
+
+    def without_campaigns(self, names: Collection[str]) -> "StudyTables":
+        """Return all rows but those of these campaigns and those about the data set."""
         return StudyTables(
             rows_by_name={
-                name: [row for row in rows if row.get("campaign") in names]
-                for name, rows in self.rows_by_name.items()
+                table: [row for row in rows if "campaign" in row and row["campaign"] not in names]
+                for table, rows in self.rows_by_name.items()
             }
         )
 
@@ -98,8 +106,10 @@ class StudyTables:
         if (size := sum(map(len, files.values()))) > MOST_BYTES:
             raise MutatorError(f"tables of {size:,} bytes", where=folder, expected=f"at most {MOST_BYTES:,}")
         make_folder(folder)
-        for name, data in files.items():
-            write_atomic(folder / name, data)
+        # it says which commit and campaigns the others are of: without it, none of them counts
+        (folder / _RUNS_FILE).unlink(missing_ok=True)
+        for name in sorted(files, key=lambda name: name == _RUNS_FILE):
+            write_atomic(folder / name, files[name])
 
     def different_tables(self, other: "StudyTables") -> list[str]:
         """Return the files that differ from those of other tables."""

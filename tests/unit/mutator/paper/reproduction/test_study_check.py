@@ -1,14 +1,16 @@
 """An edited number, in a page or in a table, is found, and so are files that changed since the study."""
 
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.paper.reproduction import study_clone
-from mutator.paper.reproduction.study_campaigns import STUDY
+from mutator.paper.reproduction import study_check, study_clone
+from mutator.paper.reproduction.data_set import files_of_campaigns
+from mutator.paper.reproduction.study_campaigns import STUDY, StudyCampaign
 from mutator.paper.reproduction.study_check import StudyCheck, changes_since_study
 from mutator.paper.reproduction.study_clone import (
     DIFFERENCES_PAGE,
@@ -22,7 +24,9 @@ from mutator.paper.reproduction.study_driving import open_study
 from mutator.paper.reproduction.study_figure import draw_hazard_shares
 from mutator.workspace import Workspace
 
-from .made_up_study import CLONE, made_up_pages, made_up_tables
+from .made_up_study import CLONE, made_up_pages, made_up_rows, made_up_tables
+
+Check = Callable[..., list[str]]
 
 BLOCKS = "Text.\n\n<!-- study: summary -->\nobsolete\n<!-- end of study -->\n\nMore.\n"
 
@@ -183,8 +187,51 @@ def test_a_page_that_is_no_text_is_found(clone: StudyClone) -> None:
     assert problem.startswith(f"{RESULTS_PAGE}:1: not what the tables give")
 
 
+@pytest.fixture
+def check_with_runs(clone: StudyClone, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Check:
+    """Check a clone with a study folder, whose made-up runs give the rows and whose data set has one file."""
+
+    def check(compared: Sequence[StudyCampaign] | None = None) -> list[str]:
+        monkeypatch.setattr(study_check, "finished_folders", lambda _, each: {c.name: c.name for c in each})
+        monkeypatch.setattr(study_check, "seals_of", lambda name: SimpleNamespace(seal=name))
+        monkeypatch.setattr(study_check, "rows_of_campaign", lambda c, *_: made_up_rows(c, clone.commit))
+        whole = StudyCheck(docs_root=clone.root, workspace=Workspace.find(root=CLONE), campaigns=STUDY)
+        return list(whole.problems(tmp_path / "study", compared))
+
+    return check
+
+
+@pytest.mark.parametrize(("name", "compared"), [("seeds.csv", None), ("observations_by_seed.csv", STUDY[:1])])
+def test_an_invented_row_is_found(
+    clone: StudyClone, check_with_runs: Check, name: str, compared: Sequence[StudyCampaign] | None
+) -> None:
+    """Also one of a campaign that the study does not have, where only some campaigns are compared."""
+    path = clone.root / TABLES_FOLDER / name
+    *_, last = path.read_text().splitlines()
+    path.write_text(f"{path.read_text()}invented{last[last.index(',') :]}\n")
+    assert f"{TABLES_FOLDER}/{name}: not what the run folders give" in check_with_runs(compared)
+
+
+def test_each_machine_compares_what_it_has_driven(clone: StudyClone, check_with_runs: Check) -> None:
+    """It needs a row of each of its files, and has all shared ones."""
+    found = check_with_runs(STUDY[:1])
+    files = sorted(files_of_campaigns(STUDY[:1]))
+    assert sorted(line for line in found if "no row of" in line) == [
+        f"{TABLES_FOLDER}/data_set.csv: no row of {name}" for name in files
+    ]
+    [missing] = [line for line in found if "no row of" not in line]
+    assert missing.endswith("runs.csv: missing, or not the file whose digest the page names")
+    edit(
+        clone.root / TABLES_FOLDER / "fault_types.csv",
+        "described,guided,radar/chaff,480",
+        "described,guided,radar/chaff,481",
+    )
+    assert f"{TABLES_FOLDER}/fault_types.csv: not what the run folders give" in check_with_runs(STUDY[:1])
+
+
 def test_pages_are_not_compared_before_all_campaigns_have_rows(clone: StudyClone) -> None:
     tables = made_up_tables(clone.commit)
-    tables.of_campaigns(["described"]).write(clone.root / TABLES_FOLDER)
+    others = [campaign.name for campaign in STUDY if campaign.name != "described"]
+    tables.without_campaigns(others).write(clone.root / TABLES_FOLDER)
     [problem] = problems(clone)
     assert problem.startswith(f"{TABLES_FOLDER}: no rows of coded, coded_2_75, reference, ")

@@ -3,13 +3,16 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
+from mutator.errors import MutatorError
 from mutator.paper import reproduce
-from mutator.paper.reproduction.data_set import files_of_campaign
+from mutator.paper.reproduction import data_set
 from mutator.paper.reproduction.study_campaigns import STUDY
 from mutator.paper.reproduction.study_clone import RESULTS_PAGE, TABLES_FOLDER, StudyClone
-from mutator.paper.reproduction.study_tables import Row, StudyTables, load_tables
+from mutator.paper.reproduction.study_tables import Row, StudyTables, combined, load_tables
+from mutator.statistics.statistics_sheet import Sheet
 from mutator.workspace import Workspace
 
 from .made_up_study import CLONE, COMMIT, made_up_rows, made_up_tables
@@ -49,8 +52,7 @@ def test_the_last_machine_writes_the_pages(write: Write, tmp_path: Path) -> None
     assert write(tmp_path / "b", NAMES[1:3], COMMIT) == NAMES[3:]
     assert write(tmp_path / "c", NAMES[3:], COMMIT) == []
     tables = load_tables(tmp_path / TABLES_FOLDER)
-    whole = made_up_tables().of_campaigns(NAMES)
-    assert tables.of_campaigns(NAMES).different_tables(whole) == []
+    assert tables.without_campaigns([]).different_tables(made_up_tables().without_campaigns([])) == []
     assert sorted(row["file"] for row in tables.rows("data_set")) == sorted(NAMES)
     assert (tmp_path / RESULTS_PAGE).read_text().startswith("# Results")
 
@@ -61,6 +63,46 @@ def test_rows_of_another_commit_are_not_kept(write: Write, tmp_path: Path) -> No
     assert {row["commit"] for row in load_tables(tmp_path / TABLES_FOLDER).rows("runs")} == {"cd" * 20}
 
 
-def test_each_campaign_has_files_of_its_own_in_the_data_set() -> None:
-    files = [file for campaign in STUDY for file in files_of_campaign(campaign.name)]
-    assert len(set(files)) == 2 * len(STUDY)
+@pytest.mark.parametrize("content", [None, "campaign\n"])
+def test_tables_that_cannot_be_read_are_replaced(write: Write, tmp_path: Path, content: str | None) -> None:
+    """Those of an interrupted writing have no `runs.csv`."""
+    write(tmp_path / "a", NAMES[:1], COMMIT)
+    runs = tmp_path / TABLES_FOLDER / "runs.csv"
+    runs.unlink()
+    if content:
+        runs.write_text(content)
+    assert write(tmp_path / "b", NAMES[1:], COMMIT) == NAMES[:1]
+    assert not load_tables(tmp_path / TABLES_FOLDER).rows("alerts", campaign=NAMES[0])
+
+
+def test_a_gap_in_the_rows_of_another_machine_is_refused(write: Write, tmp_path: Path) -> None:
+    """Nothing is written then."""
+    write(tmp_path / "a", NAMES[:1], COMMIT)
+    observations = tmp_path / TABLES_FOLDER / "observations.csv"
+    observations.write_text(observations.read_text().splitlines()[0] + "\n")
+    before = {path.name: path.read_bytes() for path in observations.parent.iterdir()}
+    with pytest.raises(MutatorError, match="rows of other machines"):
+        write(tmp_path / "b", NAMES[1:], COMMIT)
+    assert {path.name: path.read_bytes() for path in observations.parent.iterdir()} == before
+
+
+def test_the_data_set_keeps_files_that_were_brought_from_another_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(data_set, "_experiments", lambda name, _: pd.DataFrame({"campaign": [name]}))
+    monkeypatch.setattr(
+        data_set, "_dictionary", lambda _: Sheet(name="d", title="", note="", heads=("column",), lines=())
+    )
+    first, second = tmp_path / "first", tmp_path / "second"
+    rows = data_set.write_data_set(first, CLONE, STUDY, {NAMES[0]: None}, made_up_tables())  # type: ignore[dict-item]
+    [name, *_] = names = sorted(data_set.files_of_campaigns(STUDY[:1]))
+    tables = combined([{"data_set": rows, "runs": made_up_tables().rows("runs")}])
+    second.mkdir()
+    (second / name).write_bytes((first / name).read_bytes())
+    (second / "stale.csv").touch()
+    others = dict.fromkeys(NAMES[1:])
+    again = data_set.write_data_set(second, CLONE, STUDY, others, tables)  # type: ignore[arg-type]
+    assert (second / name).read_bytes() == (first / name).read_bytes() and not (second / "stale.csv").exists()
+    assert {row["file"] for row in again} >= set(names)
+    assert all(name in (second / "SHA256SUMS").read_text() for name in names)
+    assert data_set.changed_files(second, again) == [each for each in names if each != name]
