@@ -83,17 +83,17 @@ class StudyCheck:
         self, tables: StudyTables, out: Path, compared: Collection[StudyCampaign]
     ) -> Iterator[str]:
         folders = finished_folders(out, compared)
-        known = {campaign.name for campaign in self.campaigns}
+        names = {campaign.name for campaign in self.campaigns}
         commit = ""
         for row in tables.rows("runs"):
             commit = row["commit"]
             folder = folders.get(row["campaign"])
-            if row["campaign"] not in known:
+            if row["campaign"] not in names:
                 yield f"{TABLES_FOLDER}/runs.csv: the study has no campaign '{row['campaign']}'"
             elif folder and (seal := seals_of(folder).seal) != row["seal"]:
                 yield f"{row['campaign']}: the run folder has the seal {seal}, not {row['seal']}"
         again = combined(rows_of_campaign(c, folders[c.name], self.workspace, commit) for c in compared)
-        for name in tables.without_campaigns(known - set(folders)).different_tables(again):
+        for name in tables.without_campaigns(names - set(folders)).different_tables(again):
             yield f"{TABLES_FOLDER}/{name}: not what the run folders give"
 
 
