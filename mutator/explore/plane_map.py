@@ -30,6 +30,9 @@ class Profile:
         """Whether a longer fault is never less dangerous."""
         return self.is_closed and len(self.changes) + self.starts_hazardous <= 1
 
+    def is_hazardous(self, duration: int) -> bool:
+        return self.starts_hazardous is not (sum(change <= duration for change in self.changes) % 2 == 1)
+
     def first_hazardous(self, cell_count: int) -> int:
         """Return the number of the first hazardous cell; `cell_count` if there is none."""
         return 0 if self.starts_hazardous else (*self.changes, cell_count)[0]
@@ -135,7 +138,8 @@ class PlaneMap:
         """Return the state of every cell, by magnitude and duration.
 
         `closed_lines` are the lines that were searched, ascending. Other lines are drawn between them where
-        they resemble each other; where not, only cells in which both agree.
+        they resemble each other, a single one as hazardous where one of them is; where not, only cells in
+        which both agree.
         """
         lines = [self._driven_line(line) for line in range(len(self.lattice.magnitudes))]
         for line in closed_lines:
@@ -167,16 +171,13 @@ class PlaneMap:
         first, second = self.profile(below), self.profile(above)
         if not (first and second and self.is_drawn_between(below, above)):
             return None
-        if first.resembles(second):
-            share = (line - below) / (above - below)
-            ends = [round(a + share * (b - a)) for a, b in zip(first.changes, second.changes, strict=True)]
-            starts_hazardous = first.starts_hazardous
-        else:  # the line between two: where one of them is hazardous
-            ends, starts_hazardous = [min(self.first_hazardous(below), self.first_hazardous(above))], False
-        return [
-            starts_hazardous is not (sum(end <= j for end in ends) % 2 == 1)
-            for j in range(len(self.lattice.durations_s))
-        ]
+        durations = range(len(self.lattice.durations_s))
+        if above - below == 2:  # its cells touch cells of both: hazardous where one of them is, to be safe
+            return [first.is_hazardous(j) or second.is_hazardous(j) for j in durations]
+        share = (line - below) / (above - below)
+        changes = [round(a + share * (b - a)) for a, b in zip(first.changes, second.changes, strict=True)]
+        drawn = Profile(first.starts_hazardous, tuple(changes), is_closed=True)
+        return [drawn.is_hazardous(j) for j in durations]
 
     def first_hazardous(self, line: int) -> int:
         """Return the number of the first hazardous duration of a searched line; their count without one."""
@@ -187,8 +188,7 @@ class PlaneMap:
     def is_drawn_between(self, below: int, above: int) -> bool:
         """Whether what lies between two searched lines follows from them, without another line in between.
 
-        One line between two simple ones with a hazard does, however they differ: it is called hazardous where
-        one of them is, and its cells touch cells of both.
+        One line between two simple ones with a hazard does, however they differ.
         """
         first, second = self.profile(below), self.profile(above)
         if first is None or second is None:
