@@ -76,12 +76,14 @@ def explore_fault(planned: ExploringCampaign, spec: str, out: Path, workers: int
 
 
 def describe(spec: str, explored: mutator.Envelopes) -> str:
-    """Return how many planes and runs a fault has, and in how many planes no validation failed."""
-    planes = [envelope for envelope in explored if envelope.was_active]
-    clean = sum(not hazardous and not earlier for _, hazardous, earlier in map(_draws, planes))
+    """Return how many planes and runs a fault has, and in how many planes with draws none was hazardous."""
+    active = sum(envelope.was_active for envelope in explored)
+    draws = [draw for draw in map(_draws, explored) if any(draw)]
+    clean = sum(not hazardous and not earlier for _, hazardous, earlier in draws)
     return (
-        f"{spec}: {len(explored)} planes, {len(planes)} with the fault active; "
-        f"{sum(envelope.run_count for envelope in explored):,} runs, {clean} planes with clean validations"
+        f"{spec}: {len(explored)} planes, {active} with the fault active; "
+        f"{sum(envelope.run_count for envelope in explored):,} runs; "
+        f"{clean} of {len(draws)} planes with draws had no hazardous one"
         f"{f'; {explored.note}' if explored.note else ''}"
     )
 

@@ -15,11 +15,7 @@ from pathlib import Path
 from secrets import token_bytes
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.files import (
-    raising_disk_full,
-    remove_anything_at,
-    remove_folder,
-)
+from mutator._common.files import raising_disk_full, remove_anything_at, remove_folder
 from mutator._common.message_text import counted
 from mutator.engines.authenticated_files import AuthenticatedFiles
 from mutator.engines.code_swap_planning import CodeSwap, plan_swap
@@ -44,15 +40,8 @@ from mutator.engines.fork_server_processes import (
 )
 from mutator.engines.golden_run_keys import GoldenRunKey, golden_run_id, golden_run_key, resolved_path
 from mutator.engines.job_folder import PLAIN_OUTPUT_FOLDER, JobFolder, can_be_disturbance, ensure_work_folder
-from mutator.engines.observation_store import (
-    ObservationStore,
-    observations_of_watched_run,
-)
-from mutator.engines.process_endings import (
-    GUARD_PATIENCE_S,
-    ProcessEnding,
-    without_run_specifics,
-)
+from mutator.engines.observation_store import ObservationStore, observations_of_watched_run
+from mutator.engines.process_endings import GUARD_PATIENCE_S, ProcessEnding, without_run_specifics
 from mutator.engines.received_fork_output import ReceivedForkOutput
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.thread_messages import describe_too_many_threads, remedy_for_threads

@@ -30,8 +30,8 @@ from mutator.errors import ForkServerLost, NotForkable
 from mutator.targets.manifest import TargetManifest
 
 _SERVER_SCRIPT = Path(__file__).parent / "in_target" / "fork_server.py"
-# steps; a process at most this far behind is advanced, not copied: it is quickly remade
 _LOAD_REMEDY = "run `mutator check --drive`: if the golden run fails, too, no campaign can start"
+# steps; a process at most this far behind is advanced, not copied: it is quickly remade
 _MOST_STEPS_TO_ADVANCE = 100
 _MOST_HANDLES = 2  # in a reply
 _PARENT_CHECK_INTERVAL_S = 0.5  # interval between two checks that the parent is alive

@@ -40,12 +40,7 @@ from mutator.paper.reproduction.study_clone import (
     TABLES_FOLDER,
     StudyClone,
 )
-from mutator.paper.reproduction.study_driving import (
-    drive_study,
-    finished_folders,
-    is_driven,
-    open_study,
-)
+from mutator.paper.reproduction.study_driving import drive_study, finished_folders, is_driven, open_study
 from mutator.paper.reproduction.study_figure import draw_hazard_shares
 from mutator.paper.reproduction.study_tables import StudyTables, combined, load_tables
 from mutator.store.plan_choices import Choices
@@ -70,8 +65,6 @@ def write_study(
         rows_of_campaign(each, folders[each.name], workspace, clone.commit)
         if each.name in folders
         else earlier.of_campaign(each.name)
-        if earlier.rows("runs", campaign=each.name)
-        else {}
         for each in campaigns
     ]
     try:

@@ -236,7 +236,7 @@ def test_a_budget_that_is_spent_spoils_no_finished_exploration(toycar: Workspace
 
 @pytest.mark.usefixtures("kept_checks")
 def test_a_listed_zero_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """It is no size, and nothing is dropped in silence."""
+    """A fault of size 0 is none, so the spec is refused, rather than the value left out."""
     _list_values_of_lane(toycar, "[0.0, 2.5]")
     with pytest.raises(mutator.MutatorError, match="0 among the listed values"):
         mutator.envelope(SPEC, "A", 1, tmp_path / "run", workspace=toycar)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.files import make_folder, write_atomic
+from mutator._common.files import make_folder, remove_anything_at, write_atomic
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
@@ -49,7 +49,7 @@ def write_data_set(
     make_folder(folder)
     for path in folder.iterdir():
         if path.name not in elsewhere:
-            path.unlink()
+            remove_anything_at(path)
     for name, run_folder in run_folders.items():
         frame = _experiments(name, run_folder)
         parquet, csv, dictionary = _files_of_campaign(name)

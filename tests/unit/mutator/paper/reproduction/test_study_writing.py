@@ -99,10 +99,10 @@ def test_the_data_set_keeps_files_that_were_brought_from_another_machine(
     tables = combined([{"data_set": rows, "runs": made_up_tables().rows("runs")}])
     second.mkdir()
     (second / name).write_bytes((first / name).read_bytes())
-    (second / "stale.csv").touch()
+    (second / "stale" / "folder").mkdir(parents=True)
     others = dict.fromkeys(NAMES[1:])
     again = data_set.write_data_set(second, CLONE, STUDY, others, tables)  # type: ignore[arg-type]
-    assert (second / name).read_bytes() == (first / name).read_bytes() and not (second / "stale.csv").exists()
+    assert (second / name).read_bytes() == (first / name).read_bytes() and not (second / "stale").exists()
     assert {row["file"] for row in again} >= set(names)
     assert all(name in (second / "SHA256SUMS").read_text() for name in names)
     assert data_set.changed_files(second, again) == [each for each in names if each != name]
