@@ -81,7 +81,7 @@ class ExplorationRun(FileRun):
     def _finish(self, *, is_stopped: bool) -> Summary | None:
         return self._run.summary
 
-    def result_lines(self) -> Sequence[str]:
+    def result_lines(self, summary: Summary) -> Sequence[str]:
         """Return what is survived of each plane, or how many findings there are."""
         replay = self._replay
         if isinstance(replay.exploration, FindingSearch):

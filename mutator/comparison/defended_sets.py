@@ -18,10 +18,14 @@ from mutator.comparison.defended_pairs import (
 from mutator.defences.defence_facts import set_name
 from mutator.model import DefenceActivity, Outcome, Status
 from mutator.outcomes.defence_reports import load_activities
+from mutator.results.caused_golden_hazards import (
+    caused_golden_hazards,
+    caused_golden_hazards_note,
+    golden_hazard_names,
+)
 from mutator.results.result_rows import ResultRow, cells_by_row
 from mutator.results.table_building import PARQUET_FILE
 from mutator.results.table_reader import Results
-from mutator.store.checks_file import HazardTimes, describe_golden_hazards
 from mutator.store.golden_runs import GoldenRun
 from mutator.store.run_folder import RunFolder
 
@@ -128,7 +132,7 @@ def _rows_with_caused_hazards(undefended: RunFolder, defended: ComparedRun) -> d
         if row is None or record is None or record.status is not Status.OK:
             continue
         key = GoldenRun.for_experiment(experiment, several_seeds=several_seeds).key
-        usual = _golden_hazards(undefended, key)
+        usual = golden_hazard_names(undefended, key)
         if usual and record.outcome is Outcome.NOT_JUDGED:
             continue  # whose hazards these are is not known
         # a fault that was never active leaves the drive as the golden run
@@ -139,23 +143,10 @@ def _rows_with_caused_hazards(undefended: RunFolder, defended: ComparedRun) -> d
     return rows
 
 
-def caused_golden_hazards(undefended: RunFolder, defended: RunFolder) -> dict[str, HazardTimes]:
-    """Return the hazards that golden runs have with defences only, by the keys of these runs."""
-    hazards_by_key = {
-        key: tuple(h for h in hazards if h[0] not in _golden_hazards(undefended, key))
-        for key, hazards in sorted(defended.golden_hazards.items())
-    }
-    return {key: hazards for key, hazards in hazards_by_key.items() if hazards}
-
-
 def describe_caused_golden_hazards(run: RunFolder) -> str:
     """Return a line for each set of defences that causes a hazard without a fault; '' if none does."""
-    lines = []
-    for path in list_defended_runs(run.path):
-        if hazards_by_key := caused_golden_hazards(run, RunFolder.open(path)):
-            goldens = (f"{key} ({describe_golden_hazards(h)})" for key, h in hazards_by_key.items())
-            lines.append(f"with {path.name}, a hazard without any fault, by a defence: {', '.join(goldens)}")
-    return "\n".join(lines)
+    notes = (caused_golden_hazards_note(run, RunFolder.open(path)) for path in list_defended_runs(run.path))
+    return "\n".join(filter(None, notes))
 
 
 def _golden_activities(undefended: RunFolder, defended: RunFolder) -> Iterator[GoldenActivity]:
@@ -165,13 +156,9 @@ def _golden_activities(undefended: RunFolder, defended: RunFolder) -> Iterator[G
         folder = defended.golden_folder(*golden)
         if not folder.is_dir():
             continue
-        hazards = [_golden_hazards(run, golden.key) for run in (undefended, defended)]
+        hazards = [golden_hazard_names(run, golden.key) for run in (undefended, defended)]
         for activity in load_activities([defence.name for defence in defences], commands, folder):
             yield GoldenActivity(golden.key, activity, *hazards)
-
-
-def _golden_hazards(run: RunFolder, key: str) -> tuple[str, ...]:
-    return tuple(name for name, _ in run.golden_hazards.get(key, ()))
 
 
 def _harm(undefended: ResultRow, defended: ResultRow) -> tuple[str, float]:

@@ -30,6 +30,9 @@ from mutator.execution.session_items import SessionItems
 from mutator.execution.session_opening import open_session
 from mutator.execution.session_summary import Summary
 from mutator.execution.spec_places import SpecPlaces
+from mutator.results.note_on_golden_hazards import golden_hazards_note
+from mutator.results.note_without_canary import no_canary_note
+from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
@@ -113,8 +116,8 @@ class FileRun(ItemSource):
     @abstractmethod
     def _finish(self, *, is_stopped: bool) -> Summary | None: ...
 
-    def result_lines(self) -> Sequence[str]:
-        """Return what the summary of a finished run begins with."""
+    def result_lines(self, summary: Summary) -> Sequence[str]:
+        """Return what the printed summary begins with."""
         return ()
 
     def begin(self) -> None:
@@ -264,6 +267,13 @@ class CampaignRun(SessionRun):
                 where=self.path,
                 remedy="run the same command again",
             )
+
+    def result_lines(self, summary: Summary) -> Sequence[str]:
+        """Return what the results table begins with."""
+        if summary.results is None or self.out is None:
+            return ()
+        folder, frame = RunFolder.open(self.out), Results(self.out).frame()
+        return [no_canary_note(folder, frame), golden_hazards_note(folder, frame)]
 
     @property
     def _expectation(self) -> Expectation | None:

@@ -1,5 +1,6 @@
 """A campaign with a set of defences in a user's pytest session: its items, and its run folder."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,8 @@ from mutator.defences.defence_facts import set_name
 from mutator.execution.campaign_items import key_of_set
 from mutator.execution.campaign_runs import CampaignRun
 from mutator.execution.listed_items import ItemListing, ListedItem
+from mutator.execution.session_summary import Summary
+from mutator.results.caused_golden_hazards import caused_golden_hazards_note
 from mutator.store.run_folder import RunFolder
 
 
@@ -33,6 +36,13 @@ class DefendedCampaignRun(CampaignRun):
     def _item(self, item: ListedItem) -> ListedItem:
         name = key_of_set(set_name(self._names), item.name)
         return replace(item, name=name, markers=(*item.markers, *self._names))
+
+    def result_lines(self, summary: Summary) -> Sequence[str]:
+        """Return what the results table begins with, and whether the defences cause a hazard."""
+        if self.out is None or self._undefended.out is None:
+            return ()
+        undefended, defended = (RunFolder.open(path) for path in (self._undefended.out, self.out))
+        return [caused_golden_hazards_note(undefended, defended), *super().result_lines(summary)]
 
     def _default_run_folder(self) -> Path:
         self._undefended.begin()

@@ -350,11 +350,11 @@ def _exit_status(session: pytest.Session, run: FileRun, summary: Summary) -> int
 def _summary_lines(run: FileRun, summary: Summary, title: str) -> list[str]:
     missing = summary.planned - summary.done
     lines = [
-        *run.result_lines(),
+        *run.result_lines(summary),
         f"{title}{summary.done} of {summary.planned} experiments done, {summary.ran} now",
         summary.reuse_note,
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),
-        summary.golden_hazards_note,
+        "" if summary.results else summary.golden_hazards_note,
         summary.problem,
         *(f"{name}: {what}" for name, what in summary.harness_errors),
         f"proof: {summary.proof_note}" if summary.proof_note and not missing else "",

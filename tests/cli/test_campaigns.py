@@ -72,8 +72,10 @@ def test_run_prints_the_table_and_the_path_of_the_report(finished: tuple[Path, A
     assert "experiments " in said.stderr  # progress goes to stderr
 
 
-def test_run_begins_with_hazards_that_defences_cause_without_a_fault(cli: Cli, root: Path) -> None:
-    """Such a set costs more than it saves, whatever its outcomes."""
+def test_run_begins_with_hazards_that_defences_cause_without_a_fault(
+    cli: Cli, root: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Such a set costs more than it saves, whatever its outcomes. A pytest session says it, too."""
     defence = root / "fault_library" / "defences" / "emergency_brake.yaml"
     text = defence.read_text().replace("lowest_brake: {value: 1.0", "lowest_gas: {value: 1.0")
     text = text.replace("highest_gas: {value: 0,", "highest_brake: {value: 0,")
@@ -89,6 +91,9 @@ def test_run_begins_with_hazards_that_defences_cause_without_a_fault(cli: Cli, r
         r"with emergency_brake, a hazard without any fault, by a defence: A \(H1 at \d+\.\d\d s.*\)", first
     )
     assert second.startswith("fault type")
+    plain = ("-c", os.devnull, "--rootdir", ".", "-p", "no:hypothesispytest", "--assert=plain")
+    pytest.main([*plain, "--campaign", "defended", "--campaign-out", "r"])
+    assert first in capfd.readouterr().out.splitlines()
 
 
 def test_table_and_seal_do_not_wait_for_stills_and_report(
