@@ -15,6 +15,7 @@ from pathlib import Path
 import mutator
 from mutator.api.exploration_benches import experiment_builder
 from mutator.api.target_and_fault_selection import SelectedTarget
+from mutator.campaigns.exploration_section import DEFAULT_OBSERVE_S
 from mutator.explore.cell_results import CellState
 from mutator.explore.lattice import Cell
 
@@ -30,7 +31,7 @@ def main() -> int:
     options = parser.parse_args()
     inferred = [(e, cell) for path in options.runs for e in explored(path) for cell in inferred_cells(e)]
     drawn = random.Random(options.seed).sample(inferred, min(options.most, len(inferred)))
-    build = experiment_builder(SelectedTarget.of(None, TARGET), READING)
+    build = experiment_builder(SelectedTarget.of(None, TARGET), READING, DEFAULT_OBSERVE_S)
     wrong = 0
     with (
         tempfile.TemporaryDirectory() as folder,

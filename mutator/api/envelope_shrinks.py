@@ -72,7 +72,8 @@ class EnvelopeShrinker:
 
     @cached_property
     def _build_experiment(self) -> BuildExperiment:
-        return experiment_builder(self.selected_target, self.experiment.fault.reading)
+        reading, observe_s = self.experiment.fault.reading, self.envelopes[-1].exploration.section.observe_s
+        return experiment_builder(self.selected_target, reading, observe_s)
 
     def _build(self, place: EnvelopeCell) -> Experiment:
         envelope, (line, duration) = self.envelopes[place.envelope], place.cell
@@ -84,6 +85,7 @@ class EnvelopeShrinker:
         smallest, original = shrinking.smallest, self.envelopes[-1]
         envelope, hazard = self.envelopes[smallest.envelope], self.record.hazards[0][0]
         drive, duration_s = envelope.drive, envelope.durations_s[smallest.cell[1]]
+        left_s = drive.end_s - drive.start_s - duration_s
         experiment, record = self._build(smallest), shrinking.record(smallest)
         neighbours = shrinking.neighbours(smallest)
         endings = {axis: shrinking.record(place) for axis, place in neighbours.items()}
@@ -100,7 +102,7 @@ class EnvelopeShrinker:
             original_hazard_s=self.record.hazards[0][1],
             neighbours={axis: self._build(place) for axis, place in neighbours.items()},
             endings={axis: str(record.outcome or record.status) for axis, record in endings.items()},
-            observed_s=round(max(0.0, drive.end_s - drive.start_s - duration_s), 3),
+            observed_s=round(min(max(0.0, left_s), envelope.exploration.section.observe_s), 3),
             steps=() if is_original else (("by the envelope", experiment),),
             runs=shrinking.runs,
             notes=(_NOTE,),

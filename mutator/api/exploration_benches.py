@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from mutator.engines.engine_choice import check_engine_is_offered
 from mutator.execution.bench import Bench
 from mutator.execution.bench_opening import finishing, opened_bench
 from mutator.execution.distributor_choice import Distributor
+from mutator.explore.cell_results import end_of_observation
 from mutator.explore.challengers import name_with_form
 from mutator.explore.envelope_files import delete_envelopes, write_envelopes
 from mutator.explore.exploration import Exploration
@@ -72,7 +73,7 @@ def explore_envelopes(
     may_begin: Callable[[], bool],
 ) -> ExplorationReplay:
     """Explore the planes of a section on its open bench, and write what is survived of each."""
-    build = experiment_builder(selected_target, reading)
+    build = experiment_builder(selected_target, reading, section.observe_s)
     drives = find_drives(bench, selected_target.manifest, section, build)
     exploration = Exploration(section=section, drives=drives, seed=section.planes[0].seed)
     delete_envelopes(bench.path)  # a kill must not leave those of fewer runs
@@ -87,15 +88,15 @@ def search_findings(
     bench: Bench, section: ExplorationSection, selected_target: SelectedTarget, reading: str
 ) -> FindingSearch:
     """Search the planes of a section for hazardous faults, on its open bench."""
-    build = experiment_builder(selected_target, reading)
+    build = experiment_builder(selected_target, reading, section.observe_s)
     drives = find_drives(bench, selected_target.manifest, section, build)
     search = FindingSearch(section=section, drives=drives, seed=section.planes[0].seed)
     run_exploration(bench, search, build, within_budget(None))
     return search
 
 
-def experiment_builder(selected_target: SelectedTarget, reading: str) -> BuildExperiment:
-    """Return what builds the experiments of planes."""
+def experiment_builder(selected_target: SelectedTarget, reading: str, observe_s: float) -> BuildExperiment:
+    """Return what builds the experiments of planes. Runs that can stop do so `observe_s` after the fault."""
     builder, after_hazard = ExperimentBuilder(selected_target), after_hazard_of(selected_target)
 
     build_fault = fault_builder(selected_target, reading)
@@ -103,7 +104,7 @@ def experiment_builder(selected_target: SelectedTarget, reading: str) -> BuildEx
     def build(
         plane: ExploredPlane, magnitude: float | None, start_s: float, duration_s: float, form: str = ""
     ) -> Experiment:
-        return builder.build(
+        experiment = builder.build(
             build_fault(name_with_form(plane.spec, form), magnitude, plane.seed, duration_s),
             plane.scenario,
             start_s,
@@ -111,6 +112,9 @@ def experiment_builder(selected_target: SelectedTarget, reading: str) -> BuildEx
             seed=plane.seed,
             after_hazard=after_hazard,
         )
+        if after_hazard is AfterHazard.GO_ON:
+            return experiment
+        return replace(experiment, end_s=end_of_observation(start_s, duration_s, observe_s))
 
     return build
 

@@ -120,7 +120,8 @@ class ExplorationRun(FileRun):
 
     def _default_run_folder(self) -> Path:
         exploring = self._exploring
-        build = experiment_builder(exploring.selected_target, exploring.values["reading"])
+        reading, observe_s = exploring.values["reading"], exploring.section.observe_s
+        build = experiment_builder(exploring.selected_target, reading, observe_s)
         experiments = [
             build(plane, (*plane.magnitudes, None)[0], 0.0, plane.durations_s[0])
             for plane in exploring.section.planes

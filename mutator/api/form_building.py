@@ -60,7 +60,7 @@ class FormBuilder:
 
     def build(self, form: FaultForm) -> Experiment:
         """Return the experiment of a form."""
-        experiment = replace(self.original, fault=self._fault(form))
+        experiment = replace(self.original, fault=self._fault(form), end_s=None)
         if form.start_s is not None:
             trigger = named_with_hold(trigger_at_time(form.start_s, hold_s=form.duration_s))
             experiment = replace(experiment, trigger=trigger, method=Method.GUIDED)

@@ -15,6 +15,7 @@ from mutator.model import Status
 from mutator.mutants.injected_line_syntax import place_in_target
 from mutator.mutants.probe_contract import ProbeSource, is_probe_path, report_problem
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.stop_at_hazard_code import stop_function_source
 
 MOST_WAITING_PROCESSES = 8  # of golden runs, in a fork server
 
@@ -69,6 +70,7 @@ class Job:
     # drive by the manifest's stepwise function, as forks do, and report what a fork of it must know
     drive_step_by_step: bool = False
     stop_at_hazard: bool = False  # end the run at its first terminal hazard
+    end_s: float | None = None  # end a run that may stop at a hazard also at this time
     golden_end: GoldenEnd | None = None  # where a terminal hazard ends the golden run, too
     # like `keep_observations`; also note calls that make a target nondeterministic
     watch_nondeterminism: bool = False
@@ -77,6 +79,10 @@ class Job:
     # note where the injections' statements execute: file and function of each (`reach_jobs.watched_job`)
     watched_places: tuple[tuple[str, str], ...] = ()
     note_executed_functions: bool = False  # note which functions of the tree run, where Python can tell
+
+    def stop_source(self, manifest: TargetManifest) -> str | None:
+        """Return the code that says after each step whether the run ends; None if only its scenario does."""
+        return stop_function_source(manifest, self.end_s) if self.stop_at_hazard else None
 
     def problem_of_probe_report(self, report: object) -> str:
         """Return the problem with the probe's report; empty if there is none, or no probe."""
@@ -140,7 +146,7 @@ class JobResult:
     * `fallback_reason`: why another engine executed the job
     * `crash_kind`: the kind of a crash that was judged from its fork
     * `fork_step`: the step before which the run was forked
-    * `was_stopped_at_hazard`: whether a terminal hazard ended the run early
+    * `was_stopped`: whether a terminal hazard, or its `end_s`, ended the run before its scenario
     * `third_party_modules`: the third-party top-level modules that the run imported
     * `executed_functions`: what the run executed of the tree; None if that was not noted
     * `watch_report`, `executed_lines` (from 1, by file), `reach_report`, `variable_types` (by file, line and
@@ -160,7 +166,7 @@ class JobResult:
     fallback_reason: str = ""
     crash_kind: CrashKind | None = None
     fork_step: int = 0
-    was_stopped_at_hazard: bool = False
+    was_stopped: bool = False
     third_party_modules: tuple[str, ...] = ()
     executed_functions: ExecutedFunctions | None = None
     watch_report: Mapping[str, Any] = field(default_factory=dict)

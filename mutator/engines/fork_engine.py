@@ -186,6 +186,8 @@ class ForkEngine:
                 # the run stops before the fault is active, and so before a fork
                 return self._fork_before_first_step(job, folder, swap)
         if fork_point is None:
+            if job.end_s is not None:  # golden's trace is longer
+                return self._fork_before_first_step(job, folder, swap)
             return golden_result_of_inactive_fault(job, job.golden_folder, observations.executed_functions)
         return self._run_in_fork(
             self._process_before_step(job, fork_point.step, swap), job, folder, swap, fork_point
@@ -278,7 +280,7 @@ class ForkEngine:
             swap,
             self._shared_parts,
             fork_point,
-            stop_at_hazard=job.stop_at_hazard,
+            stop_source=job.stop_source(self._manifest),
             observe=observe,
         )
         # the child must begin the run; a watched run has the arguments of the waiting processes

@@ -13,7 +13,6 @@ from mutator.limits import Limits
 from mutator.mutants.defence_runtime import defence_report_request
 from mutator.mutants.probe_contract import probe_attributes_after, probe_module
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stop_at_hazard_code import stop_function_source
 
 
 class SharedParts:
@@ -51,7 +50,7 @@ def fork_request(
     shared: SharedParts,
     fork_point: ForkPoint,
     *,
-    stop_at_hazard: bool,
+    stop_source: str | None,
     observe: bool,
 ) -> dict[str, Any]:
     """Return what a fork needs to run the mutant. Without `args`, it continues a run that has begun."""
@@ -72,7 +71,7 @@ def fork_request(
         "probe_state": probe_attributes_after(
             fork_point.observation_count, fork_point.earliest_time_s, fork_point.last_time_s
         ),
-        "stop": stop_function_source(manifest) if stop_at_hazard else None,
+        "stop": stop_source,
         "watch": [value.name for value in manifest.observation.values] if observe else None,
     }
 

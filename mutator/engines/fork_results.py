@@ -72,7 +72,7 @@ class ForkResults:
             wall_s=ended.wall_s,
             was_fault_active=output.was_fault_active,
             log_tail=output.log_tail(),
-            was_stopped_at_hazard=bool(report and report.get("stopped")),
+            was_stopped=bool(report and report.get("stopped")),
             third_party_modules=tuple(report["modules"]) if report else (),
             executed_functions=executed_functions_from_json(report.get("executed")) if report else None,
             watch_report={name: report[name] for name in OBSERVATION_KEYS} if observe and report else {},

@@ -50,7 +50,6 @@ from mutator.mutants.defence_runtime import defence_report_request
 from mutator.mutants.parsed_files_and_anchors import parsed_file
 from mutator.mutants.probe_contract import probe_attributes_after, probe_module
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stop_at_hazard_code import stop_function_source
 
 _CHILD_SCRIPT = Path(__file__).parent / "in_target" / "run_once.py"
 _PARENT_CHECK_INTERVAL_S = 0.5  # interval between two checks that the parent is alive
@@ -168,7 +167,7 @@ class ReferenceEngine:
             exception=raised and exception_without_run_specifics(raised, home.path),
             was_fault_active=home.was_fault_active(),
             log_tail=home.log_tail(),
-            was_stopped_at_hazard=bool(report and report.get("stopped")),
+            was_stopped=bool(report and report.get("stopped")),
             third_party_modules=tuple(report["modules"]) if report else (),
             executed_functions=executed_functions_from_json(report.get("executed")) if report else None,
             watch_report=report.get("watched", {}) if report else {},
@@ -203,7 +202,7 @@ class ReferenceEngine:
             "memory_mb": self.limits.memory_mb,
             "disk_mb": self.limits.disk_mb,
             "steps": self.limits.steps,
-            "stop": stop_function_source(self.manifest) if job.stop_at_hazard else None,
+            "stop": job.stop_source(self.manifest),
             "stepwise": self.manifest.stepwise_function,
             "step_by_step": job.drive_step_by_step,
             "functions": job.note_executed_functions,

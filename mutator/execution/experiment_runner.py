@@ -209,6 +209,7 @@ class ExperimentRunner:
             ids_before_anchor=mutant.ids_before_anchor,
             golden_folder=self.goldens.folder_of(experiment),
             stop_at_hazard=stop,
+            end_s=experiment.end_s,
             golden_end=self.goldens.end_of(experiment) if stop else None,
             note_executed_functions=True,
         )
@@ -302,8 +303,10 @@ class ExperimentRunner:
     ) -> Record:
         activation = activation_of(execution.probe_report or {})
         reference, time = self.goldens.trace_of(experiment), self.manifest.time_channel
-        if execution.was_stopped_at_hazard:
-            if judged.t_end is None:
+        was_stopped_at_hazard = execution.was_stopped and judged.t_end is not None
+        if execution.was_stopped:
+            is_at_end = experiment.end_s is not None and faulty[time][-1] >= experiment.end_s
+            if not was_stopped_at_hazard and not is_at_end:
                 why = "was stopped, but no terminal hazard is in its trace"
                 return record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, why, mutant)
             reference = trace_and_record_loading.trace_until(reference, faulty[time][-1], time)
@@ -321,7 +324,7 @@ class ExperimentRunner:
         if problem := golden_trace_comparison.reason_not_by_fault(difference.t_first, activation):
             return record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, problem, mutant)
         compared = self._golden_hazard_rules.compare(
-            self.goldens, experiment, judged, activation, was_stopped=execution.was_stopped_at_hazard
+            self.goldens, experiment, judged, activation, was_stopped=was_stopped_at_hazard
         )
         hazards = compared.hazards
         end = hazards[0][1] if hazards else judged.t_end

@@ -85,5 +85,6 @@ def run_key(surroundings: str, experiment: Experiment, tree_digest: str, golden_
             experiment.changes,
             experiment.seed,
             experiment.after_hazard,
+            experiment.end_s,
         ]
     )

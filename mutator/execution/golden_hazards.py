@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from mutator.execution.loaded_goldens import LoadedGoldens
 from mutator.model import Experiment, GoldenClass, ObservedActivation
 from mutator.outcomes.golden_hazard_rules import (
-    DriveHazards,
     HazardComparison,
     compare_with_golden,
     drive_hazards_of,
@@ -45,18 +44,16 @@ class GoldenHazardRules:
         """Return the hazards of a run that count, and how they compare with those of a golden run that has
         some.
         """
-        if not goldens.hazards_of(experiment):
+        end_s = experiment.end_s
+        if not any(end_s is None or time <= end_s for _, time in goldens.hazards_of(experiment)):
             return HazardComparison(case=None, hazards=first_events_after(judged.hazards, activation))
         return compare_with_golden(
-            self._drive_of(goldens.judgement_of(experiment)),
-            self._drive_of(judged),
+            drive_hazards_of(goldens.judgement_of(experiment), self.scale, end_s),
+            drive_hazards_of(judged, self.scale),
             activation,
             step_s=goldens.step_s,
             was_stopped=was_stopped,
         )
-
-    def _drive_of(self, judged: RunJudgement) -> DriveHazards:
-        return drive_hazards_of(judged, self.scale)
 
 
 LEAVING_OUT = GoldenHazardRules()  # all experiments whose golden run has a hazard

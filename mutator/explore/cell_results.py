@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from mutator.limits import MOST_LIMIT_OR_TIME
 from mutator.model import Outcome, Record, Status
 from mutator.outcomes.golden_trace_comparison import BACK_TO_GOLDEN_S
 from mutator.targets.hazard_and_metric_definitions import MARGIN_PREFIX
@@ -35,6 +36,7 @@ class CellState(StrEnum):
         return self in (CellState.WITHOUT_HAZARD, CellState.BETWEEN_WITHOUT)
 
 
+_DIGITS = 6  # of times in s, as starts have
 MOST_TIME_MARGIN_MS = 10**9  # also of a drive without such a metric
 
 
@@ -60,7 +62,7 @@ class CellResult:
     * `margins`: the smallest distance from each hazard that has a margin, by metric
     * `reason`: why the cell is not decided, or how the controller ended
     * `is_activated`: whether the injected code ran while the fault was active
-    * `is_judged`: whether the run went on to its end, so that no hazard in it means that there was none
+    * `is_judged`: whether the run went on as planned, so that no hazard in it means that there was none
     """
 
     state: CellState
@@ -72,6 +74,11 @@ class CellResult:
     reason: str = ""
     is_activated: bool = True
     is_judged: bool = True
+
+
+def end_of_observation(start_s: float, duration_s: float, observe_s: float) -> float:
+    """Return when the run of a cell ends (s), unless its scenario or a hazard ends it before."""
+    return min(round(start_s + duration_s + observe_s, _DIGITS), float(MOST_LIMIT_OR_TIME))
 
 
 def judge_cell(record: Record, duration_s: float, drive: Drive, observe_s: float) -> CellResult:

@@ -13,7 +13,7 @@ from mutator._common.message_text import counted
 from mutator.campaigns.bench_files import load_campaign_of_run
 from mutator.campaigns.exploration_section import ExplorationSection
 from mutator.errors import MutatorError
-from mutator.explore.cell_results import Drive
+from mutator.explore.cell_results import Drive, end_of_observation
 from mutator.explore.challengers import challenger_of, name_with_form
 from mutator.explore.envelope import Envelope
 from mutator.explore.exploration import BatchLoop, BatchProposer, Exploration, Proposal, reason_of_batch
@@ -30,8 +30,8 @@ from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import named_with_hold, trigger_at_time, trigger_time_s
 
-# spec, value, scenario, start, duration, seed: what tells an experiment of an exploration from all others
-_CellKey = tuple[str, object, str, float | None, float | None, int]
+# spec, value, scenario, start, duration, seed, end: what tells experiments of an exploration apart
+_CellKey = tuple[str, object, str, float | None, float | None, int, float | None]
 _GoldenKey = tuple[str, str, int]  # spec, scenario, seed
 _NO_DRIVE = Drive(start_s=0.0, end_s=0.0, step_s=1.0)  # of planes without an experiment
 _REMEDY = "somebody edited the plan, a record or a golden run: restore the run folder from a copy of it"
@@ -123,7 +123,7 @@ class _ExploredPlan:
     """The plan of a run folder: experiments by what their cells say, and batches."""
 
     def __init__(self, folder: RunFolder, after_hazard: AfterHazard, step_s: float) -> None:
-        self.folder = folder
+        self.folder, self.after_hazard = folder, after_hazard
         self.ids: list[str] = []
         self.keys: list[_CellKey] = []
         self.golden_by_key: dict[_GoldenKey, GoldenRun] = {}
@@ -221,14 +221,18 @@ class _ReplayedPlan:
         return MutatorError(got, where=where, line=self._line + 1, expected=expected, remedy=_REMEDY)
 
     def _key(self, proposal: Proposal) -> _CellKey:
-        plane, (line, duration) = self._exploration.section.planes[proposal.plane], proposal.cell
+        section, (line, duration) = self._exploration.section, proposal.cell
+        plane, start_s = section.planes[proposal.plane], self._exploration.drives[proposal.plane].start_s
+        duration_s = plane.durations_s[duration]
+        ends_early = self._plan.after_hazard is AfterHazard.STOP
         return (
             name_with_form(plane.spec, proposal.form),
             plane.magnitudes[line] if plane.magnitudes else None,
             _scenario_key(plane.scenario),
-            self._exploration.drives[proposal.plane].start_s,
-            plane.durations_s[duration],
+            start_s,
+            duration_s,
             plane.seed,
+            end_of_observation(start_s, duration_s, section.observe_s) if ends_early else None,
         )
 
 
@@ -249,6 +253,7 @@ def _key_of_experiment(experiment: Experiment, after_hazard: AfterHazard) -> _Ce
         start_s if is_from_time_on else None,
         trigger.hold_s,
         experiment.seed,
+        experiment.end_s,
     )
 
 
@@ -259,9 +264,10 @@ def _scenario_key(scenario: str) -> str:
 
 
 def _cell_text(key: _CellKey) -> str:
-    spec, value, scenario, start_s, duration_s, seed = key
+    spec, value, scenario, start_s, duration_s, seed, end_s = key
     what = spec if value is None else f"{spec} {value}"
-    return f"{what} in {scenario} from {start_s} s for {duration_s} s, seed {seed}"
+    end = "" if end_s is None else f", up to {end_s:g} s"
+    return f"{what} in {scenario} from {start_s} s for {duration_s} s{end}, seed {seed}"
 
 
 def _drives_of_planes(

@@ -2,6 +2,7 @@
 added.
 """
 
+import math
 from dataclasses import dataclass
 
 from mutator.model import AgainstGolden, ObservedActivation
@@ -44,10 +45,14 @@ class HazardComparison:
     golden_hazards: EventTimes = ()
 
 
-def drive_hazards_of(judged: RunJudgement, scale: SeverityScale | None) -> DriveHazards:
-    """Return the hazards of a run, without those after the end of its drive."""
-    by_time = judged.hazards_by_time
-    times = tuple((name, time) for name, time in by_time if judged.t_end is None or time <= judged.t_end)
+def drive_hazards_of(
+    judged: RunJudgement, scale: SeverityScale | None, end_s: float | None = None
+) -> DriveHazards:
+    """Return the hazards of a run, without those after the end of its drive, and after `end_s`, at which the
+    run that is compared with it ended.
+    """
+    last_s = min(math.inf if end is None else end for end in (judged.t_end, end_s))
+    times = tuple((name, time) for name, time in judged.hazards_by_time if time <= last_s)
     classified = scale.worst_hazard(times, dict(judged.metrics), judged.t_end) if scale else None
     return DriveHazards(times=times, t_end=judged.t_end, classified=classified)
 

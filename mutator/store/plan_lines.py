@@ -16,6 +16,7 @@ from mutator._common.bounded_reading import open_regular, read_bounded_lines
 from mutator._common.confined_files import checked_name_not_path, checked_relative_path
 from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
+from mutator.limits import MOST_LIMIT_OR_TIME
 from mutator.model import (
     AfterHazard,
     Anchor,
@@ -175,6 +176,8 @@ def experiment_from_json(data: Mapping[str, Any], faults: Mapping[str, Fault]) -
     }
     if "after_hazard" in data:
         converted["after_hazard"] = AfterHazard(data["after_hazard"])
+    if "end_s" in data and not _is_end(data["end_s"], converted.get("after_hazard")):
+        raise ValueError("an end that no run can have")
     experiment = _object_from_json(Experiment, values, **converted)
     if experiment.id != data["id"]:
         raise MutatorError(
@@ -183,6 +186,11 @@ def experiment_from_json(data: Mapping[str, Any], faults: Mapping[str, Fault]) -
             remedy=DAMAGED_PLAN_REMEDY,
         )
     return experiment
+
+
+def _is_end(end_s: object, after_hazard: object) -> bool:
+    is_time = isinstance(end_s, float) and 0.0 < end_s <= MOST_LIMIT_OR_TIME
+    return is_time and after_hazard is AfterHazard.STOP
 
 
 def concrete_as_json(scenario: ConcreteScenario) -> dict[str, Any]:

@@ -35,6 +35,10 @@ from mutator.store.shards import Shard
 from mutator.store.timings import load_timings
 from mutator.targets.hazard_severity import SeverityScale
 
+STOP_AFTER_FAULT_NOTE = (
+    "Runs end at their first terminal hazard, or when their fault has been over for long enough: later "
+    "hazards and alerts are not recorded."
+)
 STOP_AT_HAZARD_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
 DEFAULT_SERIES_BUDGET_MB = 500  # budget of a run's series, unless the plan sets another: some 80,000 of 6 kB
 MOST_LISTED_IDS = 20  # experiments that an ambiguous id could mean
@@ -194,7 +198,10 @@ class RunFolder:
         else:  # all experiments of a plan have the same
             first = next(plan_file.iterate_experiments(self.path), None)
             after_hazard = first and first.after_hazard
-        return STOP_AT_HAZARD_NOTE if after_hazard == AfterHazard.STOP else ""
+        if after_hazard != AfterHazard.STOP:
+            return ""
+        first = next(plan_file.iterate_experiments(self.path), None) if self.is_bench else None
+        return STOP_AT_HAZARD_NOTE if first is None or first.end_s is None else STOP_AFTER_FAULT_NOTE
 
     @property
     def seeds(self) -> range:

@@ -1,4 +1,4 @@
-"""Generate code that ends a run at its first terminal hazard, from the manifest's conditions."""
+"""Generate code that ends a run at its first terminal hazard, by the manifest's conditions, or at a time."""
 
 import ast
 from inspect import getsource
@@ -12,8 +12,9 @@ from mutator.triggers.conditions import TIME, divide, names_in, parse_expression
 _STOP_REMEDY = "leave `after_hazard` out of the campaign, so that runs continue"
 
 
-def stop_function_source(manifest: TargetManifest) -> str:
-    """Return the source of a function `over(recorded)`, which says whether a terminal hazard holds in a step.
+def stop_function_source(manifest: TargetManifest, end_s: float | None = None) -> str:
+    """Return the source of a function `over(recorded)`, which says whether a terminal hazard holds in a step,
+    or the time `end_s` is reached.
 
     `recorded` has the step's values, by their names in the trace. The code needs `math`, and `min` and `max`
     that propagate NaN. MutatorError if the target has no terminal hazard or no `entry.stepwise`, and for a
@@ -46,6 +47,8 @@ def stop_function_source(manifest: TargetManifest) -> str:
     lines += [
         f"    {v.name} = {to_python_source(v.text, is_formula=True)}" for v in derived if v.name in needed
     ]
+    if end_s is not None:
+        conditions.append(f"{TIME} >= {end_s}")
     holds = " or ".join(f"({to_python_source(text)})" for text in conditions)
     return "\n".join(
         [getsource(divide), "_div = divide", "def over(recorded):", *lines, f"    return {holds}", ""]

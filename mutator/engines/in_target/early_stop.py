@@ -1,4 +1,4 @@
-"""Run a target to its end, or to the first terminal hazard. Standard library only."""
+"""Run a target to its end, or until a function says to stop. Standard library only."""
 
 import math
 from collections.abc import Callable, Mapping

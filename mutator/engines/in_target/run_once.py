@@ -121,7 +121,7 @@ def run_job(job: dict[str, Any]) -> None:
         elif job["stop"] is None:
             run_module(job["module"], job["args"])
         else:
-            report["stopped"] = run_to_terminal_hazard(job)
+            report["stopped"] = run_until_stopped(job)
         write_defence_report(job)
     except BaseException as err:
         report |= describe_failure(err, job["tree"], job["probe"])
@@ -185,8 +185,8 @@ def begin_stepwise_run(job: dict[str, Any]) -> Any:
     return begin(job["args"])
 
 
-def run_to_terminal_hazard(job: dict[str, Any]) -> bool:
-    """Run and write the results; return whether a terminal hazard stopped the run."""
+def run_until_stopped(job: dict[str, Any]) -> bool:
+    """Run and write the results; return whether the job's `stop` ended the run early."""
     stepped = begin_stepwise_run(job)
     stopped: bool = load_neighbour("early_stop").drive_run(stepped, job["stop"])
     stepped.write(Path(job["out"]))

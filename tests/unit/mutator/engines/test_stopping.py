@@ -66,11 +66,15 @@ def stopping(fork: Fork, edit: Edit) -> Iterator[Fork]:
     yield fork
 
 
-def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Record:
-    return run_one(fork, engine, after, at).record
+def drive(
+    fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0, end_s: float | None = None
+) -> Record:
+    return run_one(fork, engine, after, at, end_s).record
 
 
-def run_one(fork: Fork, engine: Engine, after: AfterHazard, at: float) -> RecordedExperiment:
+def run_one(
+    fork: Fork, engine: Engine, after: AfterHazard, at: float, end_s: float | None = None
+) -> RecordedExperiment:
     manifest = fork.manifest
     experiment = Experiment(
         fault=fork.fault(),
@@ -80,6 +84,7 @@ def run_one(fork: Fork, engine: Engine, after: AfterHazard, at: float) -> Record
         trigger=trigger_at_time(at),
         seed=7,
         after_hazard=after,
+        end_s=end_s,
     )
     goldens = LoadedGoldens(manifest, lambda experiment: fork.golden)
     rules = GoldenHazardRules(include=GoldenClass.HAZARD_WITHOUT_FAULT)
@@ -140,6 +145,32 @@ def test_engines_agree_on_a_run_that_stops_after_its_fault(
     assert reference == forked
     assert (reference.outcome, reference.activation is not None) == (outcome, True)
     assert reference.t_end is not None
+
+
+@pytest.mark.parametrize(("at", "end_s"), [(2.0, 2.0), (2.0, 4.5), (1000.0, 4.5)])
+def test_engines_agree_on_a_run_that_ends_at_a_time(
+    stopping: Fork, edit: Edit, at: float, end_s: float
+) -> None:
+    """It equals the beginning of the whole run, and hazards after it are neither its own nor golden's."""
+    edit(MANIFEST, '"25 >= near and hypot(speed, 0) > 0"', "t >= 5.0")
+    reference, forked = (
+        drive(stopping, one, AfterHazard.STOP, at, end_s)
+        for one in (stopping.engine.reference, stopping.engine)
+    )
+    assert reference == forked
+    assert (reference.status, reference.t_end, reference.against_golden) == (Status.OK, None, None)
+    whole = drive(stopping, stopping.engine, AfterHazard.GO_ON, at)
+    assert whole.against_golden is (AgainstGolden.SAME if at == 2.0 else None)
+    assert reference.trace_digest != whole.trace_digest
+    assert reference.t_manifest == (whole.t_manifest if (whole.t_manifest or 99.0) <= end_s else None)
+    assert reference.hazards == tuple((name, t) for name, t in whole.hazards if t <= end_s)
+
+
+def test_a_scenario_that_ends_first_ends_the_run(stopping: Fork) -> None:
+    longer = drive(stopping, stopping.engine, AfterHazard.STOP, end_s=1e6)
+    assert replace(longer, experiment_id="") == replace(
+        drive(stopping, stopping.engine, AfterHazard.STOP), experiment_id=""
+    )
 
 
 @pytest.mark.parametrize(

@@ -73,6 +73,21 @@ def test_a_missing_field_of_an_older_plan_has_its_default(experiment: Make) -> N
     assert (read.trigger.armed_after_s, read.trigger.hold_s, read.trigger.hold) == (0.0, None, Hold.WHILE)
 
 
+def test_an_end_is_a_time_of_a_run_that_can_stop(experiment: Make) -> None:
+    ending = replace(experiment(), after_hazard=AfterHazard.STOP, end_s=20.5)
+    faults = {ending.fault.id: ending.fault}
+    assert experiment_from_json(experiment_as_json(ending), faults) == ending
+    for values in (
+        {"end_s": "t"},
+        {"end_s": 20},
+        {"end_s": -1.0},
+        {"end_s": 1e300},
+        {"after_hazard": "go_on"},
+    ):
+        with pytest.raises(ValueError, match="an end that no run can have"):
+            experiment_from_json(experiment_as_json(ending) | values, faults)
+
+
 @pytest.mark.parametrize("where", ["experiment", "trigger", "fault", "injection", "anchor"])
 def test_an_unknown_field_of_a_newer_plan_is_refused(experiment: Make, where: str) -> None:
     """An unknown field could change the experiment."""
