@@ -18,7 +18,7 @@ from mutator.comparison.defended_pairs import (
 from mutator.defences.defence_facts import set_name
 from mutator.model import DefenceActivity, Outcome, Status
 from mutator.outcomes.defence_reports import load_activities
-from mutator.results.caused_golden_hazards import (
+from mutator.results.hazards_caused_by_defences import (
     caused_golden_hazards,
     caused_golden_hazards_note,
     golden_hazard_names,

@@ -11,7 +11,7 @@ from mutator.execution.campaign_items import key_of_set
 from mutator.execution.campaign_runs import CampaignRun
 from mutator.execution.listed_items import ItemListing, ListedItem
 from mutator.execution.session_summary import Summary
-from mutator.results.caused_golden_hazards import caused_golden_hazards_note
+from mutator.results.hazards_caused_by_defences import caused_golden_hazards_note
 from mutator.store.run_folder import RunFolder
 
 

@@ -10,7 +10,7 @@ from mutator.comparison.defended_pairs import PairOutcome, pair_of
 from mutator.comparison.defended_sets import DefendedSet
 from mutator.comparison.defended_sheets import prevented_share
 from mutator.model import Outcome, Status
-from mutator.results.caused_golden_hazards import caused_golden_hazards
+from mutator.results.hazards_caused_by_defences import caused_golden_hazards
 from mutator.store.golden_runs import GoldenRun
 
 from .test_defended_pairs import OBSERVE_S, OVER, facts, row
