@@ -13,9 +13,12 @@ from itertools import product
 from pathlib import Path
 
 import mutator
+from mutator.api.exploration_benches import experiment_builder
+from mutator.api.target_and_fault_selection import SelectedTarget
 from mutator.explore.cell_results import CellState, judge_cell
 from mutator.explore.lattice import Cell
 
+TARGET, READING = "openpilot", "as_described"
 PLANES = (  # fault, scenario, start in s
     ("car_sensors/speed/slower", "S5_long", 12.0),
     ("car_sensors/steer/angle", "S1_long", 5.0),
@@ -59,21 +62,14 @@ def main() -> int:
 
 def drive_all(envelope: mutator.Envelope, out: Path) -> list[list[CellState]]:
     """Drive every cell of an envelope's lattice; return the states by magnitude and duration."""
-    lattice, plane = envelope.exploration.map.lattice, envelope.plane
+    lattice, observe_s = envelope.exploration.map.lattice, envelope.exploration.section.observe_s
+    build = experiment_builder(SelectedTarget.of(None, TARGET), READING, observe_s)
     with mutator.open_bench(None, out, campaign="survived", after_hazard="stop", workers=2) as bench:
         cells = [
-            bench.build_experiment(
-                plane.spec,
-                plane.scenario,
-                envelope.drive.start_s,
-                value=magnitude,
-                hold_s=duration_s,
-                beyond=True,
-            )
+            build(envelope.plane, magnitude, envelope.drive.start_s, duration_s)
             for magnitude, duration_s in product(lattice.magnitudes, lattice.durations_s)
         ]
         records = bench.run(cells)
-    observe_s = envelope.exploration.section.observe_s
     states = [
         judge_cell(record, duration_s, envelope.drive, observe_s).state
         for record, (_, duration_s) in zip(

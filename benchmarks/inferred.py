@@ -15,7 +15,6 @@ from pathlib import Path
 import mutator
 from mutator.api.exploration_benches import experiment_builder
 from mutator.api.target_and_fault_selection import SelectedTarget
-from mutator.campaigns.exploration_section import DEFAULT_OBSERVE_S
 from mutator.explore.cell_results import CellState
 from mutator.explore.lattice import Cell
 
@@ -31,7 +30,6 @@ def main() -> int:
     options = parser.parse_args()
     inferred = [(e, cell) for path in options.runs for e in explored(path) for cell in inferred_cells(e)]
     drawn = random.Random(options.seed).sample(inferred, min(options.most, len(inferred)))
-    build = experiment_builder(SelectedTarget.of(None, TARGET), READING, DEFAULT_OBSERVE_S)
     wrong = 0
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -39,15 +37,8 @@ def main() -> int:
             None, Path(folder) / "run", campaign="survived", after_hazard="stop", workers=2
         ) as bench,
     ):
-        experiments = [
-            build(
-                envelope.plane,
-                envelope.magnitudes[cell[0]],
-                envelope.drive.start_s,
-                envelope.durations_s[cell[1]],
-            )
-            for envelope, cell in drawn
-        ]
+        selected = SelectedTarget.of(None, TARGET)
+        experiments = [experiment_of(selected, envelope, cell) for envelope, cell in drawn]
         records = {record.experiment_id: record for record in bench.run(experiments)}
     for (envelope, cell), experiment in zip(drawn, experiments, strict=True):
         hazards, expected = dict(records[experiment.id].hazards), expected_hazard(envelope, cell)
@@ -65,6 +56,12 @@ def explored(path: Path) -> tuple[mutator.Envelope, ...]:
 def inferred_cells(envelope: mutator.Envelope) -> Iterator[Cell]:
     for i, line in enumerate(envelope.cells):
         yield from ((i, j) for j, state in enumerate(line) if state is CellState.INFERRED)
+
+
+def experiment_of(selected: SelectedTarget, envelope: mutator.Envelope, cell: Cell) -> mutator.Experiment:
+    build = experiment_builder(selected, READING, envelope.exploration.section.observe_s)
+    (line, duration), start_s = cell, envelope.drive.start_s
+    return build(envelope.plane, envelope.magnitudes[line], start_s, envelope.durations_s[duration])
 
 
 def expected_hazard(envelope: mutator.Envelope, cell: Cell) -> tuple[str, float]:

@@ -85,8 +85,8 @@ class EnvelopeShrinker:
         smallest, original = shrinking.smallest, self.envelopes[-1]
         envelope, hazard = self.envelopes[smallest.envelope], self.record.hazards[0][0]
         drive, duration_s = envelope.drive, envelope.durations_s[smallest.cell[1]]
-        left_s = drive.end_s - drive.start_s - duration_s
         experiment, record = self._build(smallest), shrinking.record(smallest)
+        ends_s = drive.end_s if experiment.end_s is None else min(drive.end_s, experiment.end_s)
         neighbours = shrinking.neighbours(smallest)
         endings = {axis: shrinking.record(place) for axis, place in neighbours.items()}
         is_original = experiment.id == self.experiment.id
@@ -102,7 +102,7 @@ class EnvelopeShrinker:
             original_hazard_s=self.record.hazards[0][1],
             neighbours={axis: self._build(place) for axis, place in neighbours.items()},
             endings={axis: str(record.outcome or record.status) for axis, record in endings.items()},
-            observed_s=round(min(max(0.0, left_s), envelope.exploration.section.observe_s), 3),
+            observed_s=round(max(0.0, ends_s - drive.start_s - duration_s), 3),
             steps=() if is_original else (("by the envelope", experiment),),
             runs=shrinking.runs,
             notes=(_NOTE,),

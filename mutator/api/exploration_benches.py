@@ -21,12 +21,13 @@ from mutator.explore.cell_results import end_of_observation
 from mutator.explore.challengers import name_with_form
 from mutator.explore.envelope_files import delete_envelopes, write_envelopes
 from mutator.explore.exploration import Exploration
-from mutator.explore.exploration_replay import ExplorationReplay
+from mutator.explore.exploration_replay import ExplorationReplay, check_ends
 from mutator.explore.exploration_run import BuildExperiment, find_drives, run_exploration
 from mutator.explore.finding_search import FindingSearch
 from mutator.model import AfterHazard, Experiment
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import ProgressCallback
-from mutator.targets.stop_at_hazard_code import can_stop_at_hazard
+from mutator.targets.early_stop_code import can_stop_at_hazard
 
 SEARCHED_MAGNITUDES, SEARCHED_DURATIONS = 16, 9  # of a plane in a search for findings
 
@@ -47,8 +48,11 @@ def opened_exploration(
     """Open the bench of an exploration, and finish it at the end of the block."""
     check_whole_number("workers", workers, least=1)
     check_engine_is_offered(engine)
+    after_hazard = after_hazard_of(selected_target)
+    if RunFolder.exists(out):
+        check_ends(RunFolder.open(out), after_hazard)
     values = {name: value for name, value in values.items() if name != "include"}
-    values |= {"after_hazard": after_hazard_of(selected_target).value, "explore": asdict(section)}
+    values |= {"after_hazard": after_hazard.value, "explore": asdict(section)}
     with (
         opened_bench(
             selected_target.workspace,

@@ -108,9 +108,11 @@ def envelope(
     * `seed`: of the runs, and of what validation and proof draw. `reading`, `workers`, `engine`, `reuse`,
       `cluster`, `insecure_network`: as for `open_bench`; `progress`: as for `run`.
 
-    The run folder `out` is that of a bench, whose runs end at their first terminal hazard, if the target can
-    stop there. MutatorError for invalid input, and if a golden run never reaches a start; CheckFailed if a
-    golden run fails its checks.
+    The run folder `out` is that of a bench. If the target can stop a run, runs end at their first terminal
+    hazard, and `observe_s` after their fault.
+
+    MutatorError for invalid input, and if a golden run never reaches a start; CheckFailed if a golden run
+    fails its checks.
     """
     check_whole_number("search", search, least=1)
     check_whole_number("validation", validation)

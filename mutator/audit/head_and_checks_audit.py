@@ -115,13 +115,26 @@ def check_result_problems(folder: RunFolder) -> Problems:
 def not_activated_run_problems(
     folder: RunFolder, manifest: TargetManifest, records: Sequence[StoredRecord]
 ) -> Problems:
-    """Yield golden runs with other bytes than the runs in which no fault was active, which do the same."""
+    """Yield golden runs with other bytes than the runs in which no fault was active, which do the same.
+
+    Those that ended at a time have fewer bytes, and are compared with each other.
+    """
     idle_by_golden: dict[str, list[StoredRecord]] = {}
+    first_that_ended: dict[tuple[str, float], StoredRecord] = {}
     experiments = {experiment.id: experiment for experiment in plan_file.iterate_experiments(folder.path)}
     for stored in records:
         planned = experiments.get(stored.record.experiment_id)
         if planned is not None and stored.record.outcome is Outcome.NOT_ACTIVATED:
-            idle_by_golden.setdefault(folder.golden_run_of(planned).key, []).append(stored)
+            key = folder.golden_run_of(planned).key
+            if planned.end_s is None:
+                idle_by_golden.setdefault(key, []).append(stored)
+                continue
+            first = first_that_ended.setdefault((key, planned.end_s), stored).record
+            if stored.record.trace_digest != first.trace_digest:
+                yield stored.difference_error(
+                    f"trace {stored.record.trace_digest[:16]} without an active fault",
+                    f"that of {first.experiment_id}, which ended at the same time, {first.trace_digest[:16]}",
+                )
     for golden in folder.golden_runs:
         if golden.key not in idle_by_golden:
             continue

@@ -94,7 +94,8 @@ class ExplorationSection:
     observe_s: float = field(
         default=DEFAULT_OBSERVE_S,
         metadata=yaml_metadata(
-            "How long a drive must go on after a fault to count as without hazard, in s.",
+            "How long a drive must go on after a fault to count as without hazard, in s. If the target can "
+            "stop a run, runs end then.",
             ge=0,
             le=MOST_LIMIT_OR_TIME,
         ),
@@ -148,7 +149,8 @@ class ExplorationRequest:
     observe_s: float = field(
         default=DEFAULT_OBSERVE_S,
         metadata=yaml_metadata(
-            "How long a drive must go on after a fault to count as without hazard, in s.",
+            "How long a drive must go on after a fault to count as without hazard, in s. If the target can "
+            "stop a run, runs end then.",
             ge=0,
             le=MOST_LIMIT_OR_TIME,
         ),

@@ -34,7 +34,7 @@ from mutator.store.plan_strata import PlanStrata, load_strata
 from mutator.store.preflight_results import mean_golden_run_cpu_s
 from mutator.store.run_folder import RunFolder
 from mutator.store.shards import Shard
-from mutator.targets.stop_at_hazard_code import stop_function_source
+from mutator.targets.early_stop_code import stop_function_source
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:

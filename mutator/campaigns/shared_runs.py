@@ -15,7 +15,8 @@ def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
     """
     scenarios = scenarios_sharing_runs(manifest, experiment.changes)
     place: Hashable = scenarios if experiment.scenario in scenarios else experiment.scenario
-    return (experiment.fault.id, experiment.trigger, experiment.seed, experiment.changes, place)
+    trigger = (experiment.trigger, experiment.end_s)
+    return (experiment.fault.id, trigger, experiment.seed, experiment.changes, place)
 
 
 def scenarios_sharing_runs(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]:

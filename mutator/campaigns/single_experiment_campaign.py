@@ -160,6 +160,7 @@ def _check_same(
 
 
 def _what_runs(experiment: Experiment) -> tuple[object, ...]:
+    """Return what decides a run up to its first hazard: a campaign has no `end_s`, and goes on after it."""
     trigger = experiment.trigger
     return (
         experiment.fault.injections,

@@ -56,8 +56,8 @@ def print_outcome_counts(terminal: Terminal, run: "Run") -> None:
     with suppress(MutatorError):  # the note needs the library
         if note := run.alerts_note():
             terminal.print_text(note)
-    if run.folder.stop_at_hazard_note:
-        terminal.print_text(run.folder.stop_at_hazard_note)
+    if run.folder.early_end_note:
+        terminal.print_text(run.folder.early_end_note)
     terminal.print_result(f"outcomes: {', '.join(f'{name} {n}' for name, n in run.endings.items())}")
 
 

@@ -92,6 +92,7 @@ def differing_pairs_remarks(a: ComparedRun, b: ComparedRun, matching: Experiment
             "that end at a terminal hazard in only one run, where later hazards and alerts are missing",
             lambda p: p.a.after_hazard != p.b.after_hazard,
         ),
+        ("whose runs end at different times", lambda p: p.a.end_s != p.b.end_s),
     )
     counts = ((_count_differing(matching.pairs, differs), what) for what, differs in checks)
     return tuple(f"Pairs {what}: {n} of {len(matching.pairs)}." for n, what in counts if n)

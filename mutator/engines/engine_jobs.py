@@ -14,8 +14,8 @@ from mutator.limits import Limits
 from mutator.model import Status
 from mutator.mutants.injected_line_syntax import place_in_target
 from mutator.mutants.probe_contract import ProbeSource, is_probe_path, report_problem
+from mutator.targets.early_stop_code import stop_function_source
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stop_at_hazard_code import stop_function_source
 
 MOST_WAITING_PROCESSES = 8  # of golden runs, in a fork server
 
@@ -37,8 +37,8 @@ MODES_TO_PROVE = frozenset(mode.value for mode in RunMode if mode is not RunMode
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoldenEnd:
-    """Where a terminal hazard ends a golden run: how many rows of its trace come before, and how many it has
-    in all.
+    """Where a terminal hazard, or a set time, ends a golden run: how many rows of its trace come before, and
+    how many it has in all.
     """
 
     rows_before: int
@@ -71,7 +71,7 @@ class Job:
     drive_step_by_step: bool = False
     stop_at_hazard: bool = False  # end the run at its first terminal hazard
     end_s: float | None = None  # end a run that may stop at a hazard also at this time
-    golden_end: GoldenEnd | None = None  # where a terminal hazard ends the golden run, too
+    golden_end: GoldenEnd | None = None  # where a terminal hazard or `end_s` ends the golden run, too
     # like `keep_observations`; also note calls that make a target nondeterministic
     watch_nondeterminism: bool = False
     note_executed_lines: bool = False  # note which lines of the tree run from the first observation on

@@ -186,8 +186,6 @@ class ForkEngine:
                 # the run stops before the fault is active, and so before a fork
                 return self._fork_before_first_step(job, folder, swap)
         if fork_point is None:
-            if job.end_s is not None:  # golden's trace is longer
-                return self._fork_before_first_step(job, folder, swap)
             return golden_result_of_inactive_fault(job, job.golden_folder, observations.executed_functions)
         return self._run_in_fork(
             self._process_before_step(job, fork_point.step, swap), job, folder, swap, fork_point

@@ -38,11 +38,11 @@ class DefendedCampaignRun(CampaignRun):
         return replace(item, name=name, markers=(*item.markers, *self._names))
 
     def result_lines(self, summary: Summary) -> Sequence[str]:
-        """Return what the results table begins with, and whether the defences cause a hazard."""
+        """Return the hazards that the defences cause without a fault."""
         if self.out is None or self._undefended.out is None:
             return ()
         undefended, defended = (RunFolder.open(path) for path in (self._undefended.out, self.out))
-        return [caused_golden_hazards_note(undefended, defended), *super().result_lines(summary)]
+        return [caused_golden_hazards_note(undefended, defended)]
 
     def _default_run_folder(self) -> Path:
         self._undefended.begin()

@@ -103,12 +103,14 @@ class LoadedGoldens:
         return self.judgement_of(experiment).hazards_by_time
 
     def end_of(self, experiment: Experiment) -> GoldenEnd | None:
-        """Return where a terminal hazard ends the golden run; None if none does."""
-        t_end = self.judgement_of(experiment).t_end
-        if t_end is None:
+        """Return where a terminal hazard, or the experiment's `end_s`, ends the golden run; None if neither
+        does.
+        """
+        ends = [end for end in (self.judgement_of(experiment).t_end, experiment.end_s) if end is not None]
+        if not ends:
             return None
         times = self.trace_of(experiment)[self._manifest.time_channel]
-        return GoldenEnd(rows_before=int((times < t_end).sum()), row_count=len(times))
+        return GoldenEnd(rows_before=int((times < min(ends)).sum()), row_count=len(times))
 
     @property
     def step_s(self) -> float:

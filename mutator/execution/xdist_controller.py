@@ -249,16 +249,15 @@ class StandaloneController(CampaignController):
         for run in self._runs.values():
             try:
                 summary = run.finish(is_stopped=is_stopped)
+                if run.failure is not None:
+                    session.exitstatus = run.failure.exit_code
+                if summary is not None:
+                    title = f"{run.title}: " if len(self._runs) > 1 else ""
+                    self._closing_lines += _summary_lines(run, summary, title)
+                    session.exitstatus = _exit_status(session, run, summary)
             except MutatorError as err:
                 self._closing_lines.append(str(err))
                 session.exitstatus = err.exit_code
-                continue
-            if run.failure is not None:
-                session.exitstatus = run.failure.exit_code
-            if summary is not None:
-                title = f"{run.title}: " if len(self._runs) > 1 else ""
-                self._closing_lines += _summary_lines(run, summary, title)
-                session.exitstatus = _exit_status(session, run, summary)
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         if self._closing_lines:

@@ -87,6 +87,7 @@ def replay_exploration(folder: RunFolder, manifest: TargetManifest) -> Explorati
     if campaign.exploration is None:
         raise MutatorError("no exploration", where=campaign.path, expected="a bench with the key `explore`")
     _check_lattices(campaign.exploration, campaign.path)
+    check_ends(folder, campaign.after_hazard)
     plan = _ExploredPlan(folder, campaign.after_hazard, manifest.step_s)
     drives = _drives_of_planes(manifest, campaign.exploration, plan)
     proposer = FindingSearch if campaign.exploration.goal == "find" else Exploration
@@ -101,6 +102,21 @@ def replay_exploration(folder: RunFolder, manifest: TargetManifest) -> Explorati
     return ExplorationReplay(
         exploration, tuple(replayed_plan.differences()), is_cut_off=replayed_plan.is_cut_off
     )
+
+
+def check_ends(folder: RunFolder, after_hazard: AfterHazard) -> None:
+    """Raise MutatorError for an exploration by an earlier version, whose runs end with their scenarios."""
+    if after_hazard is AfterHazard.GO_ON:
+        return
+    for number, experiment in enumerate(plan_file.iterate_experiments(folder.path), 1):
+        if experiment.end_s is None:
+            raise MutatorError(
+                f"experiment {experiment.id} ends with its scenario",
+                where=folder.path / EXPERIMENTS_FILE,
+                line=number,
+                expected="an end soon after the fault, as in explorations by this version of mutator",
+                remedy="explore anew, into another folder",
+            )
 
 
 def _check_lattices(section: ExplorationSection, path: Path) -> None:
@@ -266,7 +282,7 @@ def _scenario_key(scenario: str) -> str:
 def _cell_text(key: _CellKey) -> str:
     spec, value, scenario, start_s, duration_s, seed, end_s = key
     what = spec if value is None else f"{spec} {value}"
-    end = "" if end_s is None else f", up to {end_s:g} s"
+    end = "" if end_s is None else f", up to {end_s} s"
     return f"{what} in {scenario} from {start_s} s for {duration_s} s{end}, seed {seed}"
 
 

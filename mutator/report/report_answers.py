@@ -47,7 +47,7 @@ def build_answers(run: ReportedRun) -> tuple[ReportAnswer, ...]:
     if (frame["outcome"] == "hazard").any():
         answers.append(fix_first_answer(frame, run.run_fault_paths, labels, has_alerts=has_alerts))
     if has_alerts:
-        answers.append(silent_hazards_answer(frame, run.folder.stop_at_hazard_note))
+        answers.append(silent_hazards_answer(frame, run.folder.early_end_note))
     answers.append(tolerated_faults_answer(frame))
     if len(run.experiment_facts.timings):
         answers.append(time_spent_answer(frame, run.experiment_facts.timings))

@@ -174,4 +174,4 @@ def _describe_plan(folder: RunFolder) -> str:
         text += "; each needs its own run"
     else:
         text += f", in {counted(runs, 'run')}, because experiments with identical runs share one run"
-    return " ".join(filter(None, (f"{text}.", folder.stop_at_hazard_note)))
+    return " ".join(filter(None, (f"{text}.", folder.early_end_note)))

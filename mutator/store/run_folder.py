@@ -192,7 +192,7 @@ class RunFolder:
         return bool(self.head.alerts)
 
     @property
-    def stop_at_hazard_note(self) -> str:
+    def early_end_note(self) -> str:
         if self.head.canary is not None:
             after_hazard = self.head.canary.get("after_hazard")
         else:  # all experiments of a plan have the same
@@ -200,8 +200,8 @@ class RunFolder:
             after_hazard = first and first.after_hazard
         if after_hazard != AfterHazard.STOP:
             return ""
-        first = next(plan_file.iterate_experiments(self.path), None) if self.is_bench else None
-        return STOP_AT_HAZARD_NOTE if first is None or first.end_s is None else STOP_AFTER_FAULT_NOTE
+        planned = plan_file.iterate_experiments(self.path) if self.is_bench else iter(())
+        return STOP_AFTER_FAULT_NOTE if any(e.end_s is not None for e in planned) else STOP_AT_HAZARD_NOTE
 
     @property
     def seeds(self) -> range:

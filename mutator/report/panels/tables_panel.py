@@ -73,7 +73,7 @@ _HTML_TEMPLATE = """\
 
 
 def counts_note(folder: RunFolder) -> str:
-    note = f" {folder.stop_at_hazard_note}" if folder.stop_at_hazard_note else ""
+    note = f" {folder.early_end_note}" if folder.early_end_note else ""
     return COUNTS_NOTE + (NO_ALERT_NOTE + note if folder.has_alerts else "")
 
 

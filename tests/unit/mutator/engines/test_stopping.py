@@ -11,6 +11,7 @@ import pytest
 
 from mutator._common.hashing import digest
 from mutator.campaigns.plan import build_plan
+from mutator.campaigns.shared_runs import group_by_run
 from mutator.engines.engine_jobs import Engine, RunMode
 from mutator.engines.fork_engine import ForkEngine
 from mutator.engines.in_target.early_stop import compile_stop_condition
@@ -30,7 +31,7 @@ from mutator.model import (
 )
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.trace_and_record_loading import trace_until
-from mutator.targets.stop_at_hazard_code import stop_function_source
+from mutator.targets.early_stop_code import stop_function_source
 from mutator.triggers import trace_formulas
 from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 
@@ -147,7 +148,7 @@ def test_engines_agree_on_a_run_that_stops_after_its_fault(
     assert reference.t_end is not None
 
 
-@pytest.mark.parametrize(("at", "end_s"), [(2.0, 2.0), (2.0, 4.5), (1000.0, 4.5)])
+@pytest.mark.parametrize(("at", "end_s"), [(2.0, 2.0), (2.0, 4.5), (4.55, 4.5), (1000.0, 4.5)])
 def test_engines_agree_on_a_run_that_ends_at_a_time(
     stopping: Fork, edit: Edit, at: float, end_s: float
 ) -> None:
@@ -160,10 +161,43 @@ def test_engines_agree_on_a_run_that_ends_at_a_time(
     assert reference == forked
     assert (reference.status, reference.t_end, reference.against_golden) == (Status.OK, None, None)
     whole = drive(stopping, stopping.engine, AfterHazard.GO_ON, at)
-    assert whole.against_golden is (AgainstGolden.SAME if at == 2.0 else None)
+    assert whole.against_golden is (None if at == 1000.0 else AgainstGolden.SAME)
+    assert (reference.activation is not None) == (at <= end_s)
     assert reference.trace_digest != whole.trace_digest
     assert reference.t_manifest == (whole.t_manifest if (whole.t_manifest or 99.0) <= end_s else None)
     assert reference.hazards == tuple((name, t) for name, t in whole.hazards if t <= end_s)
+
+
+def test_a_hazard_of_golden_in_the_last_step_is_none_of_the_fault(stopping: Fork, edit: Edit) -> None:
+    """A run ends with the first step at or after its end."""
+    edit(MANIFEST, '"25 >= near and hypot(speed, 0) > 0"', "t >= 5.0")
+    record = drive(stopping, stopping.engine, AfterHazard.STOP, end_s=4.99)
+    assert (record.hazards, record.against_golden) == ((), AgainstGolden.SAME)
+
+
+@pytest.mark.parametrize("end_s", [2.3, 2.45, 2.55])
+def test_a_trace_may_store_times_less_exactly(stopping: Fork, edit: Edit, end_s: float) -> None:
+    rounded = "(struct.unpack('f', struct.pack('f', row[0]))[0], *row[1:])"
+    edit("tree/toycar/go.py", "*self.rows, strict=True", f"*({rounded} for row in self.rows), strict=True")
+    record = drive(stopping, stopping.engine.reference, AfterHazard.STOP, end_s=end_s)
+    assert record.status is Status.OK, record.detail
+
+
+def test_runs_that_end_at_different_times_are_not_shared(stopping: Fork) -> None:
+    first, second = (
+        Experiment(
+            fault=stopping.fault(),
+            scenario="A",
+            scenario_digest="",
+            method=Method.GUIDED,
+            trigger=trigger_at_time(2.0),
+            seed=7,
+            after_hazard=AfterHazard.STOP,
+            end_s=end_s,
+        )
+        for end_s in (2.5, None)
+    )
+    assert len(group_by_run(stopping.toy.manifest("toycar"), [first, second])) == 2
 
 
 def test_a_scenario_that_ends_first_ends_the_run(stopping: Fork) -> None:

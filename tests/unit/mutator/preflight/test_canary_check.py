@@ -50,7 +50,7 @@ def test_a_campaign_of_operators_can_leave_out_the_canary(toycar: Workspace, tmp
     pd = pytest.importorskip("pandas")
     folder = without_canary(toycar, tmp_path)
     assert folder.canary is None
-    assert folder.stop_at_hazard_note == ""
+    assert folder.early_end_note == ""
     plan = build_plan(toycar, "small")
     assert plan.digest == folder.head.plan
     first, second = plan.experiments[:2]
