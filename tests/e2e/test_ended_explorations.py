@@ -121,6 +121,6 @@ def test_an_exploration_of_an_earlier_version_is_not_continued(
             raise MutatorError("explored")
     plan = (out / plan_file.EXPERIMENTS_FILE).read_bytes()
     for read in (lambda: explore(stopping, out), lambda: mutator.load_run(out, workspace=stopping).envelopes):
-        with pytest.raises(MutatorError, match="ends with its scenario.*explore anew, into another folder"):
+        with pytest.raises(MutatorError, match=r"ends with its scenario.*explore anew, into another folder"):
             read()
     assert (out / plan_file.EXPERIMENTS_FILE).read_bytes() == plan
