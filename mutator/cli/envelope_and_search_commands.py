@@ -114,8 +114,8 @@ def envelope(
         typer.Option(
             min=0,
             metavar="N",
-            help="Drive N cells of each plane that are drawn from those called without hazard; 0: none. "
-            "86 without a hazard show that at most 5 % are hazardous, 436 that at most 1 % are.",
+            help="Drive N cells of each plane, drawn from those called without hazard but not driven; 0: none. "
+            "86 without a hazard show that at most 5 % of these are hazardous, 436 that at most 1 % are.",
         ),
     ] = 86,
     seeds: Annotated[

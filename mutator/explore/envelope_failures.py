@@ -133,8 +133,13 @@ class ValidationCount:
 
     @property
     def most_hazardous_share(self) -> float:
-        """The upper limit of the share of hazardous cells, at `CONFIDENCE_OF_EACH_LOOK`: exact, for a draw
-        without replacement. Cells that were not decided, or not survived, count as hazardous.
+        """The upper limit of the share of the frame that is hazardous: see `most_hazardous_count`."""
+        return self.most_hazardous_count / self.frame if self.frame else 0.0
+
+    @property
+    def most_hazardous_count(self) -> int:
+        """The upper limit of the number of hazardous cells in the frame, at `CONFIDENCE_OF_EACH_LOOK`: exact,
+        for a draw without replacement. Cells that were not decided, or not survived, count as hazardous.
         """
         failed = self.hazardous + self.undecided + self.disengaged
         low, high = failed, self.frame - self.drawn + failed
@@ -144,7 +149,7 @@ class ValidationCount:
                 low = middle
             else:
                 high = middle - 1
-        return low / self.frame if self.frame else 0.0
+        return low
 
     def _probability_of_at_most(self, failed: int, hazardous: int) -> float:
         least = max(0, self.drawn - (self.frame - hazardous))

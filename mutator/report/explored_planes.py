@@ -4,13 +4,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
+from mutator._common.message_text import counted
 from mutator._common.phrase_texts import measured_time_text
 from mutator._common.table_rendering import TextTable
 from mutator.errors import MutatorError
 from mutator.explore.challengers import describe_challenger
 from mutator.explore.challenges import TABLE_DURATIONS_S, ChallengedBound
 from mutator.explore.envelope import BoundaryPair, Envelope
-from mutator.explore.envelope_failures import Failure, count_validation, first_failure, hazardous_share
+from mutator.explore.envelope_failures import (
+    Failure,
+    count_validation,
+    disengaged_cells,
+    first_failure,
+    hazardous_share,
+)
 from mutator.explore.envelope_texts import (
     cell_text,
     fault_text,
@@ -34,7 +41,7 @@ _TABLE_HEADS = (
     "survived for every duration",
     *(f"for {duration:g} s" for duration in TABLE_DURATIONS_S),
     "largest tried",
-    "up to",
+    "survived up to",
     "hazard after",
     "challenged",
     "validation",
@@ -49,11 +56,13 @@ TABLE_NOTE = (
     "runs, at this start in this scenario. Cells are of constant errors. Where a fault is challenged, the "
     "same size was also driven as errors that change: with alternating sign, growing, as noise and as a "
     "repeated glitch. If one of them is not survived, the largest size that survives all of them stands "
-    "before that of a constant error. Faults whose error has no size with a sign are not challenged. “Up to” "
+    "before that of a constant error. Faults whose error has no size with a sign are not challenged. “Every "
+    "duration” ends with the longest that was tried, “for 1 s” with the next one that was. “Survived up to” "
     "and “hazard after” are of the largest magnitude: up to which duration all cells are called without "
-    "hazard, and the time from the start of the longest fault to its hazard. “Validation” is the last look; "
-    "the shares of all looks together hold at 95 %. Links open the run that shows the first hazard, beside a "
-    "shorter one without. Cells called hazardous between runs are interpolated: validations do not draw them."
+    "hazard, and the time from the start of the longest fault to its hazard. “Validation” is the last, of "
+    "cells that the search left undriven; its shares hold at 95 % for all validations of a plane together. "
+    "Links open the run that shows the first hazard, beside a shorter one without. Cells called hazardous "
+    "between runs are interpolated: validations do not draw them."
 )
 _CHALLENGE_HEADS = (
     "fault",
@@ -130,13 +139,38 @@ class ExploredPlanes:
         if count < 2:
             return ""
         without = [envelope for envelope in self.envelopes if first_failure(envelope) is None]
-        undecided = sum(map(is_undecided, without))
-        safe = len(without) - undecided
+        disengaged = sum(bool(disengaged_cells(envelope)) for envelope in without)
+        undecided = sum(is_undecided(e) for e in without if not disengaged_cells(e))
+        safe = len(without) - undecided - disengaged
         if safe == count:
             return f"No hazard was found in any of the {count} planes."
         parts = [f"in {safe} of them no hazard was found"] if safe else []
+        parts += [f"in {disengaged} the controller only ended disengaged or crashed"] if disengaged else []
         parts += [f"{undecided} of them cannot be decided"] if undecided else []
-        return f"That is the worst of {count} planes; {', '.join(parts) or 'each has a hazard'}."
+        return (
+            f"That is the first of {count} planes, by their share of hazardous cells; "
+            f"{', '.join(parts) or 'each has a hazard'}."
+        )
+
+    def describe_scope(self) -> str:
+        """Return what was driven, and that nothing else was; empty without planes."""
+        if not self.envelopes:
+            return ""
+        planes = [envelope.plane for envelope in self.envelopes]
+        faults = counted(len({plane.spec for plane in planes}), "fault")
+        scenarios = ", ".join(dict.fromkeys(plane.scenario for plane in planes))
+        starts = ", ".join(dict.fromkeys(map(start_text, self.envelopes)))
+        longest_s = max(envelope.durations_s[-1] for envelope in self.envelopes)
+        observe_s = self.envelopes[0].exploration.section.observe_s
+        cells = sum(envelope.run_count for envelope in self.envelopes)
+        challenges = sum(len(envelope.exploration.challenges.results) for envelope in self.envelopes)
+        besides = f", and {counted(challenges, 'challenger')}" if challenges else ""
+        return (
+            f"Driven: {faults}, one at a time, in {scenarios}, from {starts} on, for up to {longest_s:g} s, "
+            f"and observed for {observe_s:g} s more: {counted(cells, 'cell')}{besides}. Nothing is said of "
+            "other faults, of sizes and durations between those that were tried, of several faults at once, "
+            "of other drives and starts, and of what a driver does."
+        )
 
     @property
     def linked_ids(self) -> set[str]:
@@ -216,7 +250,7 @@ def _with_challenge(envelope: Envelope, challenge: ChallengedBound | None, const
     """Return what survives all challengers before what is survived of a constant error, if it is less."""
     if challenge is None or not challenge.is_lowered:
         return constant
-    return f"{level_text(envelope, challenge)} (constant: {constant})"
+    return f"{level_text(envelope, challenge)} ({constant} if constant)"
 
 
 def _short_challenge(envelope: Envelope) -> str:
@@ -225,7 +259,11 @@ def _short_challenge(envelope: Envelope) -> str:
     if not envelope.exploration.is_complete:
         return "unfinished"
     lowered = sum(challenge.is_lowered for challenge in envelope.challenges)
-    return f"{lowered} of {len(envelope.challenges)} lowered" if envelope.challenges else "nothing survived"
+    return (
+        f"{lowered} of {counted(len(envelope.challenges), 'bound')} lowered"
+        if envelope.challenges
+        else "nothing survived"
+    )
 
 
 def _challenge_row(envelope: Envelope, challenge: ChallengedBound, *, with_links: bool) -> list[str]:
@@ -256,7 +294,7 @@ def _survived_text(envelope: Envelope, duration_s: float | None) -> str:
     if duration_s is not None and duration_s > envelope.durations_s[-1]:
         return "not tried"
     smallest, count = envelope.cells[0], envelope.columns_up_to(duration_s)
-    if any(state.is_hazardous for state in (smallest if duration_s is None else smallest[:count])):
+    if any(state.is_failed for state in (smallest if duration_s is None else smallest[:count])):
         return "none" if envelope.plane.magnitudes else "no"
     is_survived = not envelope.plane.magnitudes and all(s.is_without_hazard for s in smallest[:count])
     return "yes" if is_survived else "not decided"

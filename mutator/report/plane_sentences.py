@@ -25,7 +25,7 @@ from mutator.explore.envelope_texts import (
     start_text,
 )
 
-_LEVEL = f"{100 * CONFIDENCE_OF_ALL_LOOKS:g} %, all looks together"
+_LEVEL = f"{100 * CONFIDENCE_OF_ALL_LOOKS:g} %, for all validations of this plane together"
 _MOST_REASON_LENGTH = 100
 
 
@@ -108,8 +108,9 @@ def _last_look_text(count: ValidationCount) -> str:
             f"Validation unfinished: {count.driven} of {drawn} driven, {count.hazardous} of them {hazardous}."
         )
     if count.is_census:
-        return f"{count.hazardous} of {drawn} {hazardous}: these are all cells called without hazard."
-    return f"{count.hazardous} of {drawn} {hazardous}: {_limit_text(count)}."
+        return f"{_frame_text(count)} All were drawn: {count.hazardous} of {count.drawn} {hazardous}."
+    found = f"{counted(count.drawn, 'cell')} drawn from them: {count.hazardous} {hazardous}."
+    return f"{_frame_text(count)} {found} So {_limit_text(count)}."
 
 
 def _earlier_looks_text(envelope: Envelope) -> str:
@@ -123,9 +124,13 @@ def _earlier_looks_text(envelope: Envelope) -> str:
     return f" {counted(len(earlier), 'look')} before found {listed} hazardous {cells} then searched."
 
 
+def _frame_text(count: ValidationCount) -> str:
+    return f"The search left {counted(count.frame, 'cell')} undriven that it calls without hazard."
+
+
 def _limit_text(count: ValidationCount) -> str:
-    percent = percent_text(count.most_hazardous_share)
-    return f"at most {percent} of the cells called without hazard may be hazardous ({_LEVEL})"
+    most, percent = count.most_hazardous_count, percent_text(count.most_hazardous_share)
+    return f"at most {most} of these {count.frame} ({percent}) are hazardous ({_LEVEL})"
 
 
 def _reach_text(envelope: Envelope) -> str:
@@ -141,7 +146,8 @@ def _reach_text(envelope: Envelope) -> str:
     count = count_validation(envelope, validation)
     if not count.is_complete:
         return f"{driven}; the validation of the others is unfinished."
-    return f"{driven}, the others are inferred or between runs; {_limit_text(count)}."
+    undriven = f"of the {counted(count.frame, 'cell')} that the search left undriven and calls without hazard"
+    return f"{driven}, the others are inferred or between runs; {undriven}, {_limit_text(count)}."
 
 
 def _where(envelope: Envelope) -> str:

@@ -25,6 +25,14 @@ _COUNTING_TERMS = {
     "and fault paths leave out later steps",
     "rank": "1 is the worst; the order is by severity, silent hazards first, then by margin and time",
 }
+_PLANE_TERMS = {
+    "plane": "the magnitudes and durations of one fault, from one start on in one scenario",
+    "cell": "one magnitude and duration of a plane",
+    "inferred": "not driven: a shorter fault of this magnitude reached its hazard while it was active",
+    "between runs": "not driven: the driven cells around it agree",
+    "validation": "some cells that the search did not drive, but calls without hazard, are drawn and driven",
+    "challenger": "an error that changes, as large as a constant one that is survived",
+}
 _ENDING_TERMS = {
     "hazard": "a hazard occurred at or after activation",
     "sdc": "silent data corruption: the fault changed an actuator, without a hazard",
@@ -56,6 +64,7 @@ def glossary_of(run: ReportedRun) -> Glossary:
     sections = {
         "How an experiment ends": _ENDING_TERMS,
         "Golden runs with a hazard": _GOLDEN_HAZARD_TERMS if run.folder.golden_hazards else {},
+        "What is survived": _PLANE_TERMS if run.explored else {},
         "What is counted": _COUNTING_TERMS,
         "Alerts": _ALERT_TERMS if run.folder.has_alerts else {},
         "Hazards": {hazard.name: hazard.about for hazard in head.about_hazards if hazard.about},

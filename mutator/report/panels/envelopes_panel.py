@@ -24,7 +24,7 @@ _HTML_TEMPLATE = """\
 {% if note %}
 <p><b>{{ note }}.</b></p>
 {% endif %}
-<p class="quiet">{{ no_probability }}</p>
+<p class="quiet">{{ planes.describe_scope() }} {{ no_probability }}</p>
 {% if pictures %}
 {{ table.as_html("plain envelopes") }}
 <p class="quiet">{{ table_note }}</p>
@@ -73,7 +73,7 @@ def panel_of_planes(planes: ExploredPlanes) -> Panel:
         "## What is survived",
         f"{planes.first_sentence()} {planes.describe_all()}".rstrip(),
         f"**{note}.**" if note else "",
-        NO_PROBABILITY_NOTE,
+        f"{planes.describe_scope()} {NO_PROBABILITY_NOTE}".lstrip(),
     ]
     if planes.envelopes:
         parts += [planes.table(with_links=False).as_markdown(), TABLE_NOTE]

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from mutator.explore.cell_results import CellState
 from mutator.explore.envelope import Envelope
 from mutator.report.explored_planes import ExploredPlanes
 from mutator.report.panels.envelopes_panel import panel_of_planes
@@ -22,7 +23,9 @@ def test_the_worst_plane_comes_first() -> None:
     planes = ExploredPlanes.of_envelopes([safe, envelope_of(line), worse], {})
     scenarios = [(envelope.plane.spec, envelope.plane.scenario) for envelope in planes.envelopes]
     assert scenarios == [(MADE_PLANE.spec, "B"), (MADE_PLANE.spec, "A"), ("other/bias/speed", "A")]
-    assert planes.describe_all() == "That is the worst of 3 planes; in 1 of them no hazard was found."
+    assert planes.describe_all() == (
+        "That is the first of 3 planes, by their share of hazardous cells; in 1 of them no hazard was found."
+    )
 
 
 def test_a_row_answers_for_each_duration() -> None:
@@ -48,7 +51,7 @@ def test_a_duration_beyond_the_lattice_is_not_tried() -> None:
 def test_links_open_a_pair_of_runs() -> None:
     """The run with the hazard, with its neighbour beside it; the list has both."""
     envelope = envelope_of(line)
-    cell = row(envelope, with_links=True)["up to"]
+    cell = row(envelope, with_links=True)["survived up to"]
     planes = ExploredPlanes.of_envelopes([envelope], {})
     pair = envelope.boundary_pair(len(envelope.magnitudes) - 1)
     assert pair and pair.hazardous.experiment_id in planes.linked_ids
@@ -61,8 +64,8 @@ def test_undecided_planes_are_not_called_free_of_hazards() -> None:
     crashed = envelope_of(never, crashes=lambda m, d: m > 20)
     planes = ExploredPlanes.of_envelopes([safe, crashed], {})
     assert planes.envelopes[0] is crashed and "is not decided" in planes.first_sentence()
-    text = "That is the worst of 2 planes; in 1 of them no hazard was found, 1 of them cannot be decided."
-    assert planes.describe_all() == text
+    text = "in 1 of them no hazard was found, 1 of them cannot be decided."
+    assert planes.describe_all().endswith(text)
     both = ExploredPlanes.of_envelopes([safe, envelope_of(never)], {}).describe_all()
     assert both == "No hazard was found in any of the 2 planes."
 
@@ -72,8 +75,8 @@ def test_the_table_has_a_bound_before_and_after_its_challengers() -> None:
     plane = replace(MADE_PLANE, challengers=("alternating_0.5s",))
     lowered = envelope_of(line, plane, challengers=lambda name, m, d: m < 1.5 or d < 1.5)
     cells = row(lowered, with_links=True)
-    assert cells["survived for every duration"].endswith(" m (constant: 3.41 m)</a>")
-    assert cells["for 0.5 s"] == "50 m" and cells["challenged"] == "3 of 5 lowered"
+    assert cells["survived for every duration"].endswith(" m (3.41 m if constant)</a>")
+    assert cells["for 0.5 s"] == "50 m" and cells["challenged"] == "3 of 5 bounds lowered"
     planes = ExploredPlanes.of_envelopes([lowered, envelope_of(line, NO_VALUE)], {})
     [first, *_] = planes.challenges_table(with_links=False).rows
     assert first[3] == "3.41 m for 10 s" and first[6:] == ["changing its sign every 0.5 s", "H1 after 3.00 s"]
@@ -97,3 +100,20 @@ def test_unfinished_challenges_lower_nothing() -> None:
         assert row(cut)["challenged"] == "unfinished" and planes.first_sentence()
         assert all(c.is_complete for c in cut.challenges if c.is_lowered) and planes.linked_ids
         panel_of_planes(planes)
+
+
+def test_a_fault_after_which_nobody_drives_is_not_survived() -> None:
+    """No hazard followed, but the controller ended disengaged: so says the table."""
+    envelope = envelope_of(never, NO_VALUE, crashes=lambda m, d: d > 0.3, without_result=CellState.DISENGAGED)
+    assert row(envelope)["for 1 s"] == "no" and row(envelope)["survived for every duration"] == "no"
+    planes = ExploredPlanes.of_envelopes([envelope, envelope_of(line)], {})
+    assert planes.describe_all().endswith("in 1 the controller only ended disengaged or crashed.")
+
+
+def test_the_page_says_what_was_driven_and_that_nothing_else_was() -> None:
+    text = ExploredPlanes.of_envelopes([envelope_of(line)], {}).describe_scope()
+    assert text.startswith(
+        "Driven: 1 fault, one at a time, in A, from 5 s on, for up to 10 s, and observed for "
+    )
+    assert "Nothing is said of other faults" in text and "challenger" not in text
+    assert ExploredPlanes(envelopes=()).describe_scope() == ""

@@ -31,8 +31,11 @@ def test_the_sentence_says_where_it_fails_and_what_was_driven() -> None:
     assert text.startswith("No hazard of sensor/bias/distance of up to 3.41 m was found in A from 5 s, for ")
     assert "; it first fails at 5 m for 1." in text
     assert "(H1, the car touches the vehicle ahead, after 2.00 s). " in text
-    assert re.search(r"\. \d+ of 156 cells were driven, the others are inferred or between runs; at", text)
-    assert text.endswith("of the cells called without hazard may be hazardous (95 %, all looks together).")
+    assert re.search(r"\. \d+ of 156 cells were driven, the others are inferred or between runs; of", text)
+    assert re.search(
+        r"of the 72 cells that the search left undriven .*, at most 23 of these 72 \(32 %\)", text
+    )
+    assert text.endswith(" are hazardous (95 %, for all validations of this plane together).")
     assert "tried" not in text
 
 
@@ -109,19 +112,19 @@ def test_the_validation_says_what_follows() -> None:
     """The share that can be hazardous, with its level; or that every cell was driven."""
     text = describe_plane_validation(envelope_of(line, validation=10))
     assert re.fullmatch(
-        r"0 of 10 drawn cells hazardous: at most \d+ % of the cells called without hazard may be hazardous "
-        r"\(95 %, all looks together\)\.",
+        r"The search left 72 cells undriven that it calls without hazard\. 10 cells drawn from them: 0 "
+        r"hazardous\. So at most 23 of these 72 \(32 %\) are hazardous \(95 %, for all validations of .*\)\.",
         text,
     )
     assert describe_plane_validation(envelope_of(never, validation=0)) == "Not validated."
-    assert "these are all" in describe_plane_validation(envelope_of(never, validation=1000))
+    assert "All were drawn: 0 of" in describe_plane_validation(envelope_of(never, validation=1000))
     assert "Nothing to validate" in describe_plane_validation(envelope_of(never, NO_VALUE))
 
 
 def test_earlier_looks_are_shown() -> None:
     """What repairs followed on is not hidden by the last look."""
     text = describe_plane_validation(envelope_of(holes, FINE, validation=86))
-    assert text.startswith("0 of 86 drawn cells hazardous: at most 4.9 % of the cells")
+    assert "86 cells drawn from them: 0 hazardous. So at most 8" in text and "(4.9 %)" in text
     assert text.endswith(" 1 look before found 1 hazardous cell, whose line was then searched.")
 
 
