@@ -114,7 +114,7 @@ def envelope(
         typer.Option(
             min=0,
             metavar="N",
-            help="Drive N cells of each plane, drawn from those called without hazard but not driven; 0: none. "
+            help="Drive N cells of each plane, drawn from undriven ones called without hazard; 0: none. "
             "86 without a hazard show that at most 5 % of these are hazardous, 436 that at most 1 % are.",
         ),
     ] = 86,

@@ -43,7 +43,7 @@ _TABLE_HEADS = (
     "largest tried",
     "survived up to",
     "hazard after",
-    "challenged",
+    "challengers lowered",
     "validation",
     "runs of cells",
 )
@@ -74,6 +74,7 @@ _CHALLENGE_HEADS = (
     "changing how",
     "what follows",
 )
+NO_BREAK = "\N{NO-BREAK SPACE}"
 _Proof: TypeAlias = Failure | BoundaryPair | ChallengedBound
 
 
@@ -255,15 +256,12 @@ def _with_challenge(envelope: Envelope, challenge: ChallengedBound | None, const
 
 def _short_challenge(envelope: Envelope) -> str:
     if not envelope.is_challenged:
-        return "no"
+        return "not challenged"
     if not envelope.exploration.is_complete:
         return "unfinished"
     lowered = sum(challenge.is_lowered for challenge in envelope.challenges)
-    return (
-        f"{lowered} of {counted(len(envelope.challenges), 'bound')} lowered"
-        if envelope.challenges
-        else "nothing survived"
-    )
+    bounds = counted(len(envelope.challenges), "bound")
+    return f"{lowered} of {bounds}" if envelope.challenges else "nothing survived"
 
 
 def _challenge_row(envelope: Envelope, challenge: ChallengedBound, *, with_links: bool) -> list[str]:
@@ -317,4 +315,5 @@ def _linked(text: str, proof: _Proof | None) -> "str | Markup":
         return text
     from markupsafe import Markup
 
+    text = text.replace(" ", NO_BREAK).replace(f"{NO_BREAK}(", " (")  # may wrap only there
     return Markup('<a href="#e={}">{}</a>').format(Markup("&amp;with=").join(names), text)

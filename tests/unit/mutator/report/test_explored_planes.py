@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from mutator.explore.cell_results import CellState
 from mutator.explore.envelope import Envelope
-from mutator.report.explored_planes import ExploredPlanes
+from mutator.report.explored_planes import NO_BREAK, ExploredPlanes
 from mutator.report.panels.envelopes_panel import panel_of_planes
 from tests.unit.mutator.explore.made_envelopes import MADE_PLANE, envelope_of, line, never
 
@@ -75,14 +75,15 @@ def test_the_table_has_a_bound_before_and_after_its_challengers() -> None:
     plane = replace(MADE_PLANE, challengers=("alternating_0.5s",))
     lowered = envelope_of(line, plane, challengers=lambda name, m, d: m < 1.5 or d < 1.5)
     cells = row(lowered, with_links=True)
-    assert cells["survived for every duration"].endswith(" m (3.41 m if constant)</a>")
-    assert cells["for 0.5 s"] == "50 m" and cells["challenged"] == "3 of 5 bounds lowered"
+    bound = cells["survived for every duration"].replace(NO_BREAK, " ")
+    assert bound.endswith(" m (3.41 m if constant)</a>")
+    assert cells["for 0.5 s"] == "50 m" and cells["challengers lowered"] == "3 of 5 bounds"
     planes = ExploredPlanes.of_envelopes([lowered, envelope_of(line, NO_VALUE)], {})
     [first, *_] = planes.challenges_table(with_links=False).rows
     assert first[3] == "3.41 m for 10 s" and first[6:] == ["changing its sign every 0.5 s", "H1 after 3.00 s"]
     challenge = lowered.challenged()
     assert challenge and challenge.result and challenge.result.experiment_id in planes.linked_ids
-    assert row(envelope_of(line, NO_VALUE))["challenged"] == "no"
+    assert row(envelope_of(line, NO_VALUE))["challengers lowered"] == "not challenged"
     panel = panel_of_planes(planes)
     assert "What challengers lowered" in panel.html and "What challengers lowered" in panel.markdown
 
@@ -97,7 +98,7 @@ def test_unfinished_challenges_lower_nothing() -> None:
     for count in range(begin, begin + len(challenges)):
         cut = envelope_of(line, plane, most_runs=count, challengers=lambda name, m, d: m < 1.5)
         planes = ExploredPlanes.of_envelopes([cut], {})
-        assert row(cut)["challenged"] == "unfinished" and planes.first_sentence()
+        assert row(cut)["challengers lowered"] == "unfinished" and planes.first_sentence()
         assert all(c.is_complete for c in cut.challenges if c.is_lowered) and planes.linked_ids
         panel_of_planes(planes)
 
