@@ -109,8 +109,8 @@ def _last_look_text(count: ValidationCount) -> str:
         )
     if count.is_census:
         return f"{_frame_text(count)} All were drawn: {count.hazardous} of {count.drawn} {hazardous}."
-    found = f"{counted(count.drawn, 'cell')} drawn from them: {count.hazardous} {hazardous}."
-    return f"{_frame_text(count)} {found} So {_limit_text(count)}."
+    draw = f"{counted(count.drawn, 'cell')} drawn from them: {count.hazardous} {hazardous}."
+    return f"{_frame_text(count)} {draw} So {_limit_text(count)}."
 
 
 def _earlier_looks_text(envelope: Envelope) -> str:
