@@ -94,9 +94,10 @@ def test_sobol_covers_a_plane_more_evenly_than_chance(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("method", SAMPLING_METHODS)
-def test_more_scenarios_than_there_are_is_refused(family: Family, method: str) -> None:
+def test_more_scenarios_than_there_are_is_refused(tmp_path: Path, method: str) -> None:
+    (tmp_path / "stop.yaml").write_text(TEXT.replace("to: 100,", "to: 10,"))
     with pytest.raises(MutatorError, match=r"only \d+ scenarios that differ and meet its constraints"):
-        sample_scenarios(family, 6000, method, 0)
+        sample_scenarios(load_family(tmp_path / "stop.yaml"), 60, method, 0)
 
 
 @pytest.mark.parametrize("method", DRAWN)
