@@ -90,7 +90,13 @@ def test_the_undefended_run_is_as_without_the_key(
     assert heads[0].keys() == heads[1].keys()
 
 
-@pytest.mark.parametrize("more", [{"workers": 2}, {"engine": "reference"}], ids=["workers", "reference"])
+@pytest.mark.parametrize(
+    "more",
+    [
+        pytest.param({"workers": 2}, id="workers"),
+        pytest.param({"engine": "reference"}, id="reference", marks=pytest.mark.slow),
+    ],
+)
 def test_workers_and_engine_change_no_byte(
     places: tuple[Workspace, Path], tmp_path: Path, more: dict[str, object]
 ) -> None:

@@ -198,6 +198,7 @@ def test_damaged_hazards_of_golden_runs_are_refused(
         RunFolder(run).golden_hazards  # noqa: B018
 
 
+@pytest.mark.slow
 def test_merged_shards_leave_out_the_same(with_crash: Workspace, tmp_path: Path) -> None:
     whole = mutator.run("small", tmp_path / "whole", workspace=with_crash)
     shards = [tmp_path / f"shard{number}" for number in (1, 2)]

@@ -45,7 +45,7 @@ def replace_text(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new))
 
 
-@pytest.mark.parametrize("workers", [0, 2])
+@pytest.mark.parametrize("workers", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_campaign_of_reused_runs_has_the_same_files(
     toycar: Workspace, tmp_path: Path, workers: int
 ) -> None:

@@ -103,11 +103,12 @@ def test_results_are_those_of_checks_that_come_first(
             OTHER_GAP.replace("500.0", "500.0 + hash('x') % 9"),
             "golden A+alone: two runs that differ in nothing but PYTHONHASHSEED",
         ),
-        (
+        pytest.param(
             "tree/toycar/go.py",
             OTHER_GAP,
             OTHER_GAP.replace("500.0", "500.0 + len([*Path(__file__).parent.glob('*.py')])"),
             "null mutant A+alone: the probe alone changes what the target does",
+            marks=pytest.mark.slow,
         ),
         (
             "fault_library/campaigns/small.yaml",
