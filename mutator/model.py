@@ -253,8 +253,7 @@ class Experiment:
     setting: tuple[str, ...] = ()  #: changes of the scenario that the campaign makes for all its experiments
     #: whether the run continues after a terminal hazard: `go_on` or `stop`
     after_hazard: AfterHazard = added_field(AfterHazard.GO_ON)
-    #: time (s) at which the run ends if nothing ends it before, only with `stop`; None: the scenario's end
-    end_s: float | None = added_field(None)
+    end_s: float | None = added_field(None)  #: with `stop`: when the run ends (s); None: with its scenario
     #: the scenario, if a family gave it; name and digest identify it
     concrete: ConcreteScenario | None = field(default=None, compare=False, repr=False)
 

@@ -1,5 +1,6 @@
 """Turn experiments into records: build each mutant, run it, compare it with its golden run, judge it."""
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -303,16 +304,13 @@ class ExperimentRunner:
     ) -> Record:
         activation = activation_of(execution.probe_report or {})
         reference, time = self.goldens.trace_of(experiment), self.manifest.time_channel
-        was_stopped_at_hazard = execution.was_stopped and judged.t_end is not None
-        end_s = None  # of a run that its `end_s` stopped
-        if execution.was_stopped:
-            last_s = float(faulty[time][-1])
-            if not was_stopped_at_hazard:
-                end_s = last_s
-                if experiment.end_s is None or last_s < experiment.end_s - self.manifest.step_s / 2:
-                    why = f"was stopped at {last_s} s, but neither by a terminal hazard nor at its end"
-                    return record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, why, mutant)
-            reference = trace_and_record_loading.trace_until(reference, last_s, time)
+        stopped_s = float(faulty[time][-1]) if execution.was_stopped else None
+        if stopped_s is not None:
+            least_s = math.inf if experiment.end_s is None else experiment.end_s - self.manifest.step_s / 2
+            if judged.t_end is None and stopped_s < least_s:
+                why = f"was stopped at {stopped_s} s, but neither by a terminal hazard nor at its end"
+                return record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, why, mutant)
+            reference = trace_and_record_loading.trace_until(reference, stopped_s, time)
         faulty = trace_and_record_loading.with_golden_times(reference, faulty, time)
         if lost := find_lost_value(self.manifest, reference, faulty, judged.t_end):
             problem = golden_trace_comparison.reason_not_by_fault(lost.time_s, activation)
@@ -327,12 +325,7 @@ class ExperimentRunner:
         if problem := golden_trace_comparison.reason_not_by_fault(difference.t_first, activation):
             return record_of_mutant_without_outcome(experiment, Status.HARNESS_ERROR, problem, mutant)
         compared = self._golden_hazard_rules.compare(
-            self.goldens,
-            experiment,
-            judged,
-            activation,
-            was_stopped_at_hazard=was_stopped_at_hazard,
-            end_s=end_s,
+            self.goldens, experiment, judged, activation, stopped_s=stopped_s
         )
         hazards = compared.hazards
         end = hazards[0][1] if hazards else judged.t_end

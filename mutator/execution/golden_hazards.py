@@ -39,13 +39,13 @@ class GoldenHazardRules:
         judged: RunJudgement,
         activation: ObservedActivation | None,
         *,
-        was_stopped_at_hazard: bool,
-        end_s: float | None,
+        stopped_s: float | None,
     ) -> HazardComparison:
         """Return the hazards of a run that count, and how they compare with those of a golden run that has
-        some. `end_s` is when a run without a terminal hazard was stopped: later hazards of the golden run do
-        not count.
+        some. `stopped_s` is when the run was stopped: unless a terminal hazard did that, later hazards of the
+        golden run do not count.
         """
+        end_s = stopped_s if judged.t_end is None else None
         if not any(end_s is None or time <= end_s for _, time in goldens.hazards_of(experiment)):
             return HazardComparison(case=None, hazards=first_events_after(judged.hazards, activation))
         return compare_with_golden(
@@ -53,7 +53,7 @@ class GoldenHazardRules:
             drive_hazards_of(judged, self.scale),
             activation,
             step_s=goldens.step_s,
-            was_stopped=was_stopped_at_hazard,
+            was_stopped=stopped_s is not None and judged.t_end is not None,
         )
 
 

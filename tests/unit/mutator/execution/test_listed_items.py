@@ -2,6 +2,7 @@
 
 import os
 import re
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from mutator.execution.listed_items import ItemListing, list_experiments, list_p
 from mutator.execution.spec_places import SpecPlaces
 from mutator.model import Experiment, Method
 from mutator.workspace import Workspace
+from tests.costs import is_soon
 
 PLACE = ("radar.yaml", 7)
 
@@ -103,10 +105,12 @@ def test_a_large_plan_is_listed_by_chunks(
     assert [positions for _, positions, _ in listed([*numbered[:2], *numbered[4:]])] == [(0, 1), (4, 5, 6)]
 
 
-def test_collecting_opens_and_runs_nothing(experiment: Callable[..., Experiment], tmp_path: Path) -> None:
-    """A listing is enough: neither plan nor target nor library is there."""
+def test_collecting_5000_experiments_takes_at_most_two_seconds_of_a_quiet_machine(
+    experiment: Callable[..., Experiment], tmp_path: Path
+) -> None:
+    """Of CPU time, with all that pytest does. Neither plan nor target nor library is opened."""
     (tmp_path / "many.yaml").write_text("")
-    experiments = [experiment(value=number) for number in range(500)]
+    experiments = [experiment(value=number) for number in range(5000)]
     counted: list[int] = []
 
     class Many(ItemSource):
@@ -127,8 +131,10 @@ def test_collecting_opens_and_runs_nothing(experiment: Callable[..., Experiment]
             counted.append(len(session.items))
 
     alone = ["-c", os.devnull, "--rootdir", str(tmp_path), "--disable-plugin-autoload", "--noconftest"]
+    began = time.process_time()
     pytest.main(
         [*alone, "-p", "no:cacheprovider", "--collect-only", "-qq", str(tmp_path / "many.yaml")],
         plugins=[Collecting()],
     )
-    assert counted == [500]
+    assert counted == [5000]
+    assert is_soon(time.process_time() - began)
