@@ -44,6 +44,7 @@ from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 from . import toy_eyes
+from .looked_up_once import looked_up_once
 from .parsed_once import parsed_once
 
 _TESTS = Path(__file__).parent
@@ -95,8 +96,8 @@ def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _texts_are_parsed_once() -> Iterator[None]:
-    with parsed_once():
+def _work_is_done_once() -> Iterator[None]:
+    with parsed_once(), looked_up_once():
         yield
 
 
