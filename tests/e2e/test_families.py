@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -16,6 +17,8 @@ from mutator.campaigns.plan_tally import plan_digest
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
+from mutator.preflight import forked_golden_runs
+from mutator.report.panels import figures_panel
 from mutator.store import file_digests, trace_packing
 from mutator.store.file_digests import FileDigest
 from mutator.store.golden_verdicts import load_golden_verdicts
@@ -49,9 +52,16 @@ pytestmark = pytest.mark.filterwarnings(
 )
 
 
+CopyToycar = Callable[[Path], Workspace]
+
+
 @pytest.fixture
 def families(toy: Workspace) -> Workspace:
     """The toy car with a family, and a campaign in its scenarios and in A."""
+    return with_family(toy)
+
+
+def with_family(toy: Workspace) -> Workspace:
     (toy.library / "families").mkdir()
     (toy.library / "families" / "follow.yaml").write_text(FAMILY)
     campaign = toy.library / "campaigns" / "toy.yaml"
@@ -60,9 +70,24 @@ def families(toy: Workspace) -> Workspace:
     return toy
 
 
-def test_engines_and_sessions_give_the_same_bytes_in_a_family(families: Workspace, tmp_path: Path) -> None:
-    whole, parts = tmp_path / "whole", tmp_path / "parts"
-    assert run_campaign(families, "toy", whole, engine="fork").exit_code == 0
+@pytest.fixture
+def few_references(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drive three golden runs of the families on the reference engine, instead of twenty."""
+    monkeypatch.setattr(forked_golden_runs, "_LEAST_DRIVEN_ON_REFERENCE", 3)
+
+
+@pytest.fixture(scope="module")
+def forked_run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
+    """The campaign of `families`, run in forks. Tests must not write to its folder."""
+    folder = tmp_path_factory.mktemp("families")
+    assert run_campaign(with_family(copy_toycar(folder)), "toy", folder / "run", engine="fork").exit_code == 0
+    return folder / "run"
+
+
+def test_engines_and_sessions_give_the_same_bytes_in_a_family(
+    families: Workspace, forked_run: Path, tmp_path: Path
+) -> None:
+    whole, parts = forked_run, tmp_path / "parts"
     for number in (1, 2):
         shard = Choices(shard=f"{number}/2")
         out = tmp_path / f"shard{number}"
@@ -105,8 +130,11 @@ def test_tables_pages_and_filters_are_by_family(families: Workspace, tmp_path: P
     assert mutator.verify(run.path, workspace=families).differences == ()
 
 
-def test_frequencies_of_the_road_weigh_the_shares(families: Workspace, tmp_path: Path) -> None:
+def test_frequencies_of_the_road_weigh_the_shares(
+    families: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A family with a `frequency` has weighted shares, as long as its file is as it was when planned."""
+    monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())  # they take seconds
     family, run = families.library / "families" / "follow.yaml", tmp_path / "run"
     part = "{from: 14, to: 17, weight: 3}, {from: 17, to: 20, weight: 1}"
     text = family.read_text().replace(
@@ -158,12 +186,13 @@ def forge_digests(run: Path) -> None:
     file_digests.save_ledger(run, file_digests.DigestLedger(files=files))
 
 
-def test_edits_of_a_packed_golden_run_are_found(families: Workspace, tmp_path: Path) -> None:
+def test_edits_of_a_packed_golden_run_are_found(
+    families: Workspace, forked_run: Path, tmp_path: Path
+) -> None:
     """Golden runs of families are packed. Whoever edits one needs as many forgeries as for any other, and
     changes the seal.
     """
-    out = tmp_path / "run"
-    run_campaign(families, "toy", out, engine="fork")
+    out = Path(shutil.copytree(forked_run, tmp_path / "run"))
     run = mutator.load_run(out, workspace=families)
     seal, results_digest = run.seals.seal, run.seals.results_digest
     packed = sorted((out / "golden").glob("*.packed"))
@@ -201,16 +230,16 @@ def test_edits_of_a_packed_golden_run_are_found(families: Workspace, tmp_path: P
 
 
 def test_seals_do_not_depend_on_packing(
-    families: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    families: Workspace, forked_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another version of the compressor gives other bytes, but the golden runs are the same."""
-    run_campaign(families, "toy", tmp_path / "1", engine="fork")
     monkeypatch.setattr(trace_packing, "_LZMA_PRESET", 0)
-    run_campaign(families, "toy", tmp_path / "0", engine="fork")
-    files = [{p.name: p.read_bytes() for p in (tmp_path / n / "golden").glob("*.packed")} for n in "10"]
+    run_campaign(families, "toy", tmp_path / "run", engine="fork")
+    runs = (forked_run, tmp_path / "run")
+    files = [{p.name: p.read_bytes() for p in (run / "golden").glob("*.packed")} for run in runs]
     assert files[0].keys() == files[1].keys()
     assert files[0] != files[1]
-    seals = [mutator.load_run(tmp_path / name, workspace=families).seals for name in "10"]
+    seals = [mutator.load_run(run, workspace=families).seals for run in runs]
     assert seals[0] == seals[1]
 
 
@@ -228,7 +257,7 @@ def test_a_bench_takes_scenarios_of_families(families: Workspace, tmp_path: Path
         assert bench.run([first])[0] == record
 
 
-@pytest.mark.parametrize("killed", [False, True])
+@pytest.mark.parametrize("killed", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_the_plan_csv_of_a_bench_has_columns_of_families(
     families: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, killed: bool
 ) -> None:
@@ -284,22 +313,23 @@ def test_seeds_share_the_scenarios_of_the_first(families: Workspace) -> None:
     assert others != by_seed[8]
 
 
+@pytest.mark.usefixtures("few_references")
 def test_a_campaign_without_faults_drives_its_scenarios(families: Workspace, tmp_path: Path) -> None:
-    without_faults(families, 24)
+    without_faults(families, 6)
     out = tmp_path / "run"
     assert run_campaign(families, "toy", out, engine="fork").exit_code == 0
     run = mutator.load_run(out, workspace=families)
     drives = run.drives()
-    assert len(drives) == 25
+    assert len(drives) == 7
     assert set(drives["scenario"]) == {"A", "follow"}
     assert {"ego_mps", "gap_m", "driven_s"} <= set(drives.columns)
     assert drives["driven_s"].min() > 5
     assert [path.name for path in (out / "golden").iterdir()] == [
         "A"
     ]  # the traces of the others are not kept
-    assert run.drives_note().startswith("25 fault-free drives, ")
+    assert run.drives_note().startswith("7 fault-free drives, ")
     family = next(result for result in check_results(run.folder) if result.name == "family follow")
-    assert family.detail.startswith("24 golden runs, 20 of them")
+    assert family.detail.startswith("6 golden runs, 3 of them")
     assert mutator.verify(out, workspace=families).differences == ()
     assert run_campaign(families, "toy", out, engine="fork").seal == run.seals.seal
     other = tmp_path / "other"
@@ -331,9 +361,10 @@ def test_equal_drives_of_several_seeds_count_once(families: Workspace, tmp_path:
     assert mutator.verify(out, workspace=families).differences
 
 
+@pytest.mark.usefixtures("few_references")
 def test_a_crash_without_a_fault_names_the_scenario(families: Workspace, tmp_path: Path) -> None:
     """Nothing runs, and the message has the values with which `mutator try` drives the scenario."""
-    without_faults(families, 24)
+    without_faults(families, 6)
     world = families.manifest("toycar").root / "toycar" / "world.py"
     moved = "self.gap += (self.lead_speed - self.speed) * STEP"
     text = world.read_text()
@@ -359,8 +390,9 @@ def test_a_fork_that_differs_stops_the_family(
         run_campaign(families, "toy", tmp_path / "run", engine="fork")
 
 
+@pytest.mark.usefixtures("few_references")
 def test_forged_results_of_drives_are_found(families: Workspace, tmp_path: Path) -> None:
-    without_faults(families, 24)
+    without_faults(families, 6)
     run = tmp_path / "run"
     run_campaign(families, "toy", run, engine="fork")
     whole = {
@@ -374,9 +406,9 @@ def test_forged_results_of_drives_are_found(families: Workspace, tmp_path: Path)
     for path, data in whole.items():
         path.write_bytes(data)
     lines = (run / SCENARIOS_FILE).read_text().splitlines(keepends=True)
-    (run / SCENARIOS_FILE).write_text("".join(lines[:10]))  # as if it had never been drawn
+    (run / SCENARIOS_FILE).write_text("".join(lines[:3]))  # as if it had never been drawn
     checks = json.loads((run / "checks.json").read_text())
-    names = ["A", *(json.loads(line)["name"] for line in lines[:10])]
+    names = ["A", *(json.loads(line)["name"] for line in lines[:3])]
     for key in ("goldens", "verdicts"):
         checks[key] = {name: checks[key][name] for name in names}
     (run / "checks.json").write_bytes(json_bytes(checks))
@@ -434,19 +466,21 @@ def test_a_library_scenario_with_the_name_of_a_drawn_one_is_refused(families: Wo
         build_plan(families, "toy")
 
 
+@pytest.mark.usefixtures("few_references")
 def test_a_target_that_cannot_be_forked_is_driven_on_the_reference_engine(
     families: Workspace, tmp_path: Path
 ) -> None:
-    without_faults(families, 24)
+    without_faults(families, 6)
     world = families.manifest("toycar").root / "toycar" / "world.py"
     wait = "threading.Thread(target=threading.Event().wait, daemon=True).start()"
     world.write_text(f"import threading\n{wait}\n{world.read_text()}")
     assert run_campaign(families, "toy", tmp_path / "run", engine="fork").exit_code == 0
 
 
+@pytest.mark.usefixtures("few_references")
 @pytest.mark.skipif(shutil.which("bwrap") is None, reason="needs bubblewrap")
 def test_families_run_in_a_sandbox(families: Workspace, tmp_path: Path) -> None:
-    without_faults(families, 24)
+    without_faults(families, 6)
     sandboxed = dataclasses.replace(families, sandbox=True)
     assert run_campaign(sandboxed, "toy", tmp_path / "run", engine="fork").exit_code == 0
 
