@@ -12,6 +12,7 @@ import mutator
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Outcome
+from mutator.report.panels import figures_panel
 from mutator.report.report_builder import write_report
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
@@ -137,8 +138,8 @@ def test_the_library_must_stay_the_same(
 ) -> None:
     """A set whose defence was edited is not continued."""
     workspace = copy_toycar(tmp_path)
-    run = tmp_path / "run"
-    assert run_campaign(workspace, "defended", run).exit_code == 0
+    run = shutil.copytree(places[1], tmp_path / "run")
+    assert run_campaign(workspace, "defended", run).ran == 0
     path = workspace.defences["emergency_brake"]
     path.write_text(path.read_text().replace("value: 1.5", "value: 1.6"))
     with pytest.raises(MutatorError, match=r"sources changed .* defence emergency_brake"):
@@ -188,7 +189,7 @@ variants:
 """
 
 
-@pytest.mark.parametrize("engine", ["fork", "reference"])
+@pytest.mark.parametrize("engine", ["fork", pytest.param("reference", marks=pytest.mark.slow)])
 def test_a_fault_in_a_defence_makes_it_prevent_nothing(
     copy_toycar: CopyToycar, tmp_path: Path, engine: str
 ) -> None:
@@ -346,8 +347,11 @@ def test_folders_that_were_swapped_or_linked_are_refused(
         write_report(run, places[0])
 
 
-def test_a_report_is_written_whatever_the_order_of_a_set(copy_toycar: CopyToycar, tmp_path: Path) -> None:
+def test_a_report_is_written_whatever_the_order_of_a_set(
+    copy_toycar: CopyToycar, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Defences act by priority, which need not be the order of the campaign."""
+    monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())  # they take seconds
     workspace = copy_toycar(tmp_path)
     path = workspace.campaign("defended")
     path.write_text(path.read_text().replace(KEY, "defences: [none, [emergency_brake, pedal_limit]]\n"))

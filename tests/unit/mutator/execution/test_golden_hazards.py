@@ -1,6 +1,7 @@
 """Campaigns with a scenario whose golden run has a hazard."""
 
 import csv
+import shutil
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Callable
@@ -26,15 +27,29 @@ from mutator.workspace import Workspace
 CRASH = "steps: 120\nspeed: 30\ngap: 70\nlead_speed: -10\nlead_brakes: 0.8\n"
 
 
+CopyToycar = Callable[[Path], Workspace]
+
+
 @pytest.fixture
 def with_crash(toycar: Workspace) -> Workspace:
     """The toy's campaign `small`, in scenario A and in CRASH, whose golden run has a contact."""
+    return add_crash(toycar)
+
+
+def add_crash(toycar: Workspace) -> Workspace:
     (toycar.library / "scenarios" / "CRASH.yaml").write_text(CRASH)
     path = toycar.campaign("small")
     text = path.read_text().replace("scenarios: [A]", "scenarios: [A, CRASH]")
     longer = "  - {spec: sensor/distance/longer, values: 2}\n"
     path.write_text(text.replace("faults:\n", f"faults:\n{longer}"))
     return toycar
+
+
+@pytest.fixture(scope="module")
+def whole_run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> mutator.Run:
+    """The whole campaign, run once for all tests, which must not write to its folder."""
+    folder = tmp_path_factory.mktemp("whole")
+    return mutator.run("small", folder / "run", workspace=add_crash(copy_toycar(folder)))
 
 
 def include(workspace: Workspace) -> None:
@@ -51,11 +66,12 @@ def records_by_scenario(run: mutator.Run) -> dict[str, list[Record]]:
 
 
 def test_experiments_whose_golden_run_has_a_hazard_are_left_out_and_named(
-    with_crash: Workspace, tmp_path: Path
+    with_crash: Workspace, whole_run: mutator.Run, tmp_path: Path
 ) -> None:
-    run = mutator.run("small", tmp_path / "run", workspace=with_crash)
-    assert run.summary
-    assert run.summary.exit_code == 0
+    run = mutator.load_run(shutil.copytree(whole_run.path, tmp_path / "run"), workspace=with_crash)
+    summary = whole_run.summary
+    assert summary
+    assert summary.exit_code == 0
     records = records_by_scenario(run)
     left_out = records.pop("CRASH")
     [detail] = {record.detail for record in left_out}
@@ -64,7 +80,7 @@ def test_experiments_whose_golden_run_has_a_hazard_are_left_out_and_named(
     assert all(r.status is Status.OK and r.against_golden is None for rest in records.values() for r in rest)
     note = f"{len(left_out)} experiments of {len(run.records)} left out: {detail} ({len(left_out)}). "
     note += "`include: hazard_without_fault` in the campaign runs them."
-    assert run.summary.golden_hazards_note == run.golden_hazards_note() == note
+    assert summary.golden_hazards_note == run.golden_hazards_note() == note
     assert note.replace("`", "<code>", 1).split("`")[0] in run.report().page.read_text()
     assert [*run.folder.golden_hazards] == ["CRASH"]
     rows = list(csv.DictReader((run.path / "results.csv").open()))
@@ -74,15 +90,14 @@ def test_experiments_whose_golden_run_has_a_hazard_are_left_out_and_named(
     assert run.counts().rows[-1][1] == str(len(rows) - len(left_out))  # injected
     proved = run.folder.records("proof")
     assert all(record.status is Status.OK for record in proved.values())
-    assert run.summary.proof
-    assert run.summary.proof.is_complete
+    assert summary.proof
+    assert summary.proof.is_complete
     assert mutator.verify(run.path, workspace=with_crash).differences == ()
 
 
 def test_a_resume_knows_what_was_left_out_and_gives_the_same_bytes(
-    with_crash: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    with_crash: Workspace, whole_run: mutator.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = mutator.run("small", tmp_path / "whole", workspace=with_crash)
     finish = Session.finish
 
     def cut(session: Session, **options: bool) -> object:
@@ -96,8 +111,8 @@ def test_a_resume_knows_what_was_left_out_and_gives_the_same_bytes(
     resumed = mutator.run("small", tmp_path / "run", workspace=with_crash)
     assert resumed.summary
     assert resumed.summary.ran == 0
-    assert resumed.summary.seal == whole.summary.seal  # type: ignore[union-attr]
-    assert (resumed.path / "results.csv").read_bytes() == (whole.path / "results.csv").read_bytes()
+    assert resumed.summary.seal == whole_run.summary.seal  # type: ignore[union-attr]
+    assert (resumed.path / "results.csv").read_bytes() == (whole_run.path / "results.csv").read_bytes()
 
 
 def test_a_campaign_that_includes_them_judges_what_the_fault_adds(
@@ -148,9 +163,11 @@ def test_an_unknown_class_to_include_is_refused(with_crash: Workspace) -> None:
         mutator.plan("small", workspace=with_crash)
 
 
-def test_an_experiment_that_was_left_out_cannot_be_rerun(with_crash: Workspace, tmp_path: Path) -> None:
+def test_an_experiment_that_was_left_out_cannot_be_rerun(
+    with_crash: Workspace, whole_run: mutator.Run
+) -> None:
     """`try` runs it, with the verdict of a campaign that includes it."""
-    run = mutator.run("small", tmp_path / "run", workspace=with_crash)
+    run = whole_run
     name = next(r.experiment_id for r in run.records.values() if r.status is Status.LEFT_OUT)
     with pytest.raises(MutatorError, match="was left out: the golden run of CRASH"):
         run.experiment(name).rerun()
@@ -199,15 +216,16 @@ def test_damaged_hazards_of_golden_runs_are_refused(
 
 
 @pytest.mark.slow
-def test_merged_shards_leave_out_the_same(with_crash: Workspace, tmp_path: Path) -> None:
-    whole = mutator.run("small", tmp_path / "whole", workspace=with_crash)
+def test_merged_shards_leave_out_the_same(
+    with_crash: Workspace, whole_run: mutator.Run, tmp_path: Path
+) -> None:
     shards = [tmp_path / f"shard{number}" for number in (1, 2)]
     for number, out in enumerate(shards, start=1):
         choices = mutator.Choices(shard=f"{number}/2")
         mutator.run("small", out, workspace=with_crash, choices=choices, reuse=False)
     merged = mutator.merge_runs(shards, tmp_path / "merged")
-    assert (merged.path / "results.csv").read_bytes() == (whole.path / "results.csv").read_bytes()
-    assert merged.golden_hazards_note() == whole.golden_hazards_note()
+    assert (merged.path / "results.csv").read_bytes() == (whole_run.path / "results.csv").read_bytes()
+    assert merged.golden_hazards_note() == whole_run.golden_hazards_note()
 
 
 @pytest.mark.parametrize("stored", [False, True])
@@ -234,8 +252,8 @@ def test_an_item_of_what_was_left_out_is_skipped_with_the_reason(
     assert ending.reason_left_out.startswith("the golden run of CRASH has a hazard without any fault")
 
 
-def test_exports_do_not_judge_what_was_left_out(with_crash: Workspace, tmp_path: Path) -> None:
-    run = mutator.run("small", tmp_path / "run", workspace=with_crash)
+def test_exports_do_not_judge_what_was_left_out(whole_run: mutator.Run, tmp_path: Path) -> None:
+    run = whole_run
     run.export("junit", tmp_path / "junit.xml")
     cases = ET.parse(tmp_path / "junit.xml").getroot().iter("testcase")
     skipped = [case.find("skipped") for case in cases if "CRASH," in str(case.get("name"))]

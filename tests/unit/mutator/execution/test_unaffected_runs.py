@@ -4,6 +4,7 @@ Python 3.11 cannot tell what runs execute, so most tests say it by hand: everyth
 """
 
 import dataclasses
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -45,19 +46,34 @@ EXECUTED = ExecutedFunctions(
     }
 )
 Run = Callable[..., Summary]
+CopyToycar = Callable[[Path], Workspace]
 
 
 @pytest.fixture
-def executed(monkeypatch: pytest.MonkeyPatch) -> Callable[[ExecutedFunctions | None], None]:
+def executed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Say what runs execute, in any Python."""
+    say_what_runs_execute(monkeypatch)
 
-    def say(functions: ExecutedFunctions | None) -> None:
-        for engine in (fork_results, reference_engine):
-            monkeypatch.setattr(engine, "executed_functions_from_json", lambda data: functions)
 
-    monkeypatch.setattr(earlier_run, "CAN_RECORD_CODE", True)
-    say(EXECUTED)
-    return say
+def say_what_runs_execute(patch: pytest.MonkeyPatch) -> None:
+    for engine in (fork_results, reference_engine):
+        patch.setattr(engine, "executed_functions_from_json", lambda data: EXECUTED)
+    patch.setattr(earlier_run, "CAN_RECORD_CODE", True)
+
+
+@pytest.fixture(scope="module")
+def run_of_pristine_toy(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
+    """The folder of an earlier run, before any edit, which nearly every test needs."""
+    folder = tmp_path_factory.mktemp("base")
+    with pytest.MonkeyPatch.context() as patch:
+        say_what_runs_execute(patch)
+        mutator.run("small", folder / "run", workspace=copy_toycar(folder), engine="fork", reuse=False)
+    return folder / "run"
+
+
+@pytest.fixture
+def base(run_of_pristine_toy: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(run_of_pristine_toy, tmp_path / "base"))
 
 
 def edit(toycar: Workspace, path: str, old: str, new: str) -> None:
@@ -68,13 +84,14 @@ def edit(toycar: Workspace, path: str, old: str, new: str) -> None:
 
 
 @pytest.mark.usefixtures("executed")
-def test_what_a_change_cannot_affect_is_left_out(toycar: Workspace, tmp_path: Path, run: Run) -> None:
+def test_what_a_change_cannot_affect_is_left_out(
+    toycar: Workspace, base: Path, tmp_path: Path, run: Run
+) -> None:
     """All results and the seal are those of a run of everything; only timings tell the difference, and the
     audit finds nothing. What was left out can be left out again, by each of two workers.
     """
-    run("base")
     edit(toycar, DRIVER, "-0.6 * offset", "offset * -0.6")
-    quick, full = run("quick", since=tmp_path / "base"), run("full")
+    quick, full = run("quick", since=base), run("full")
     assert (quick.left_out, quick.done, full.left_out) == (12, 12, 0)
     assert quick.since_note == (
         "since base: 12 of 12 left out, because nothing that they executed has changed"
@@ -87,11 +104,10 @@ def test_what_a_change_cannot_affect_is_left_out(toycar: Workspace, tmp_path: Pa
 
 
 @pytest.mark.usefixtures("executed")
-def test_what_a_change_can_affect_runs(toycar: Workspace, tmp_path: Path, run: Run) -> None:
+def test_what_a_change_can_affect_runs(toycar: Workspace, base: Path, run: Run) -> None:
     """The summary says why. The proof of what was left out is mostly that of the earlier run."""
-    run("base")
     edit(toycar, DRIVER, "self.warned = []", "self.warned = list()")
-    summary = run("new", since=tmp_path / "base")
+    summary = run("new", since=base)
     assert summary.left_out == 0
     assert summary.since_note == (
         f"since base: 0 of 12 left out; the others ran: {DRIVER} changed in Driver.__init__ (12)"
@@ -99,11 +115,11 @@ def test_what_a_change_can_affect_runs(toycar: Workspace, tmp_path: Path, run: R
 
 
 @pytest.fixture
-def asked(toycar: Workspace, tmp_path: Path, run: Run) -> Callable[..., set[str]]:
+def asked(toycar: Workspace, base: Path) -> Callable[..., set[str]]:
     """Ask, of the experiments of the run `base`, why they must run now."""
 
     def reasons(golden_digest: str = "", **changes: object) -> set[str]:
-        folder = mutator.load_run(tmp_path / "base").folder
+        folder = mutator.load_run(base).folder
         assignment = RecordingAssignment(
             surroundings=surroundings_by_name(toycar, toycar.manifest("toycar")),
             version_by_package=run_environment.versions_of_fixed_packages(),
@@ -123,18 +139,13 @@ def asked(toycar: Workspace, tmp_path: Path, run: Run) -> Callable[..., set[str]
     return reasons
 
 
+@pytest.mark.usefixtures("executed")
 def test_everything_that_decides_a_result_must_be_the_same(
-    toycar: Workspace,
-    tmp_path: Path,
-    run: Run,
-    asked: Callable[..., set[str]],
-    executed: Callable[..., None],
-    monkeypatch: pytest.MonkeyPatch,
+    toycar: Workspace, base: Path, asked: Callable[..., set[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Golden runs, manifest, templates, packages, and lines if the record names them; and it must be known
     what ran.
     """
-    run("base")
     assert asked() == {""}
     assert asked(golden_digest="another") == {"the golden run of A changed"}
     assert asked(surroundings={"mutator": "another"}) == {"mutator changed"}
@@ -156,7 +167,7 @@ def test_everything_that_decides_a_result_must_be_the_same(
     with monkeypatch.context() as patched:
         patched.setattr(unaffected_runs, "is_storable", lambda record: False)
         assert asked() == {"they ended there as ok"}
-    for path in (tmp_path / "base" / "executed").iterdir():
+    for path in (base / "executed").iterdir():
         path.unlink()
     assert asked() == {"what they executed was not recorded"}
 
@@ -265,22 +276,20 @@ def test_records_with_line_numbers(detail: str, error: RunError | None, names: b
 
 @pytest.mark.usefixtures("executed")
 def test_a_wrong_decision_fails_the_proof(
-    toycar: Workspace, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+    toycar: Workspace, base: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of the sample of the proof, one that was left out runs all the same."""
-    run("base")
     edit(toycar, WORLD, "now >= 2.0", "now >= 1.0")
     monkeypatch.setattr(UnaffectedRuns, "reason", lambda self, experiment: "")
     with pytest.raises(CheckFailed, match="differs on the reference engine"):
-        run("new", since=tmp_path / "base")
+        run("new", since=base)
 
 
 @pytest.mark.usefixtures("executed")
 def test_most_of_the_proof_is_that_of_the_earlier_run(
-    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+    base: Path, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Otherwise, the proof would take longer than everything else."""
-    run("base")
     jobs: list[str] = []
     execute = reference_engine.ReferenceEngine.execute
 
@@ -289,7 +298,7 @@ def test_most_of_the_proof_is_that_of_the_earlier_run(
         return execute(self, job, folder)
 
     monkeypatch.setattr(reference_engine.ReferenceEngine, "execute", noted)
-    summary = run("new", since=tmp_path / "base")
+    summary = run("new", since=base)
     assert summary.proof is not None
     assert (summary.proof.sampled, summary.proof.is_complete) == (3, True)
     planned = {*mutator.load_run(tmp_path / "new").folder.experiment_ids()}

@@ -9,7 +9,7 @@ from mutator.store.golden_runs import GoldenRun
 
 
 def driven_on_reference(count_by_family: dict[str, int], seed: int = 7) -> list[GoldenRun]:
-    """Return the golden runs of families, of so many scenarios, that are driven on the reference engine too."""
+    """Return the golden runs of families of so many scenarios that the reference engine drives, too."""
     by_name = {
         f"{family}-{number}": SimpleNamespace(scenario=SimpleNamespace(family=family))
         for family, count in count_by_family.items()
