@@ -8,6 +8,7 @@ import pytest
 
 import mutator
 from mutator.report import experiment_list_data
+from mutator.report.panels import figures_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -34,7 +35,9 @@ def explored(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Pa
         campaign="small",
         workspace=workspace,
     )
-    mutator.load_run(place / "run", workspace=workspace).report()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures_panel, "draw_figures", lambda frame: ())  # no test looks at them
+        mutator.load_run(place / "run", workspace=workspace).report()
     return place / "run"
 
 
@@ -68,8 +71,15 @@ def test_a_cell_opens_both_runs_of_the_border(page: "Page") -> None:
     assert page.page.locator(".beside-row select").input_value() == beside
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1440, 400])
+@pytest.mark.parametrize(
+    ("width", "scheme"),
+    [
+        (1440, "light"),
+        (400, "dark"),
+        pytest.param(1440, "dark", marks=pytest.mark.slow),
+        pytest.param(400, "light", marks=pytest.mark.slow),
+    ],
+)
 def test_it_reads_well_on_every_screen(
     page: "Page", serious_faults: Callable[[Any], list[str]], scheme: str, width: int
 ) -> None:

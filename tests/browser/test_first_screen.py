@@ -164,8 +164,15 @@ def test_numbers_have_intervals_and_lead_to_their_experiments(
     assert page.inner_text("#found") == f"{hazards} of 24 experiments"
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1440, 400])
+@pytest.mark.parametrize(
+    ("width", "scheme"),
+    [
+        (1440, "light"),
+        (400, "dark"),
+        pytest.param(1440, "dark", marks=pytest.mark.slow),
+        pytest.param(400, "light", marks=pytest.mark.slow),
+    ],
+)
 def test_axe_finds_no_serious_fault_on_the_first_screen(
     replayed: Path,
     opened: Callable[..., Any],

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -48,11 +49,22 @@ def explore(workspace: Workspace, out: Path, points: int = 10, validation: int =
     )
 
 
+@pytest.fixture(scope="module")
+def finished_run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
+    """The run folder of a finished exploration in another copy of the toy car."""
+    folder = tmp_path_factory.mktemp("explored")
+    explore(copy_toycar(folder), folder / "run")
+    return folder / "run"
+
+
 @pytest.mark.usefixtures("kept_checks")
-def test_an_envelope_is_an_ordinary_finished_run(toycar: Workspace, tmp_path: Path) -> None:
+def test_an_envelope_is_an_ordinary_finished_run(
+    toycar: Workspace, finished_run: Path, tmp_path: Path
+) -> None:
     """The lane sensor may be 1 m wrong for any time, 2.5 m for a short one; the run folder is sealed, and the
     same call again runs nothing.
     """
+    shutil.copytree(finished_run, tmp_path / "run")
     explored = explore(toycar, tmp_path / "run")
     [envelope] = explored
     assert envelope.survives(0.5, 3.0) and not envelope.survives(2.5, 3.0) and envelope.survives(2.5, 0.05)
@@ -70,8 +82,11 @@ def test_an_envelope_is_an_ordinary_finished_run(toycar: Workspace, tmp_path: Pa
 
 
 @pytest.mark.usefixtures("kept_checks")
-def test_shrinking_takes_what_the_envelope_has(toycar: Workspace, tmp_path: Path) -> None:
+def test_shrinking_takes_what_the_envelope_has(
+    toycar: Workspace, finished_run: Path, tmp_path: Path
+) -> None:
     """At most three runs: the smallest cell with the hazard, and its neighbours on both axes without it."""
+    shutil.copytree(finished_run, tmp_path / "run")
     [envelope] = explore(toycar, tmp_path / "run")
     run = mutator.load_run(tmp_path / "run", workspace=toycar)
     results = envelope.exploration.map.results
