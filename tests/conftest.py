@@ -31,6 +31,7 @@ from mutator.model import (
     Trigger,
 )
 from mutator.mutants.parsed_files_and_anchors import ParsedFile, parsed_file
+from mutator.report.panels import figures_panel
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter, read_segment
 from mutator.store.file_digests import FileDigest
@@ -44,6 +45,7 @@ from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 from . import toy_eyes
+from .garbage_collection import exempt_late_modules_from_collection, exempt_objects_from_collection
 from .looked_up_once import looked_up_once
 from .parsed_once import parsed_once
 
@@ -63,12 +65,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Exempt the objects that exist now from garbage collection: each in-process campaign collects several
-    times. The next ones are collected seldom."""
-    gc.collect()
-    gc.freeze()
+    """Collect the objects that come after now seldom."""
+    exempt_objects_from_collection()
     gc.set_threshold(20_000, 20, 20)
     gc.enable()
+
+
+def pytest_runtest_teardown() -> None:
+    exempt_late_modules_from_collection()
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
@@ -119,6 +123,12 @@ def kept_checks(_cache: Path, _caches: Path) -> None:
     kept.mkdir(parents=True, exist_ok=True)
     (_cache / "mutator").mkdir()
     (_cache / "mutator" / "checks").symlink_to(kept)
+
+
+@pytest.fixture
+def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw no figures in reports. They take seconds, and other tests look at them."""
+    monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())
 
 
 @pytest.fixture

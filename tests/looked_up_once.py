@@ -17,10 +17,12 @@ import pytest
 import mutator
 from mutator import workspace
 from mutator.campaigns import run_environment, run_provenance
+from mutator.faults import fault_model_files
 from mutator.faults.fault_models import FaultModels
 from mutator.store.session_environments import GitCloneState
 
 _HARNESS_FOLDER = Path(mutator.__file__).parent
+_SMALL = 1 << 20  # bytes
 
 
 @contextmanager
@@ -81,7 +83,8 @@ def _clone_state() -> Callable[[Path], GitCloneState | None]:
 
 
 def _fault_models() -> Callable[[Path], FaultModels]:
-    """Remember the fault models of the last templates folder while it has the same files and no links."""
+    """Remember the fault models of the last templates folder while it has the same files. Without links in
+    it, none can lead out of it."""
     look_up = workspace.load_fault_models
     remembered: dict[object, FaultModels] = {}
 
@@ -90,7 +93,7 @@ def _fault_models() -> Callable[[Path], FaultModels]:
         if key is None:
             return look_up(folder)
         if key not in remembered:
-            models = look_up(folder)
+            models = fault_model_files._load_all(folder)
             remembered.clear()
             remembered[key] = models
         return remembered[key]
@@ -99,13 +102,14 @@ def _fault_models() -> Callable[[Path], FaultModels]:
 
 
 def _plain_files(folder: Path) -> object:
-    """Return what changes with each file of a templates folder; None if one of them is no plain file."""
+    """Return what changes with each file of a templates folder; None if one is a link or large, because then
+    the harness must check it."""
     files = []
     try:
         with os.scandir(folder) as entries:
             for entry in entries:
                 state = entry.stat(follow_symlinks=False)
-                if stat.S_ISREG(state.st_mode):
+                if stat.S_ISREG(state.st_mode) and state.st_size < _SMALL:
                     files.append((entry.name, state.st_ino, state.st_size, state.st_mtime_ns))
                 elif not stat.S_ISDIR(state.st_mode):
                     return None

@@ -12,7 +12,6 @@ import mutator
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Outcome
-from mutator.report.panels import figures_panel
 from mutator.report.report_builder import write_report
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
@@ -347,11 +346,9 @@ def test_folders_that_were_swapped_or_linked_are_refused(
         write_report(run, places[0])
 
 
-def test_a_report_is_written_whatever_the_order_of_a_set(
-    copy_toycar: CopyToycar, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("without_figures")
+def test_a_report_is_written_whatever_the_order_of_a_set(copy_toycar: CopyToycar, tmp_path: Path) -> None:
     """Defences act by priority, which need not be the order of the campaign."""
-    monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())  # they take seconds
     workspace = copy_toycar(tmp_path)
     path = workspace.campaign("defended")
     path.write_text(path.read_text().replace(KEY, "defences: [none, [emergency_brake, pedal_limit]]\n"))

@@ -172,7 +172,14 @@ def test_all_items_give_what_mutator_run_gives(
     assert f"seal: {summary.seal}" in printed
 
 
-@pytest.mark.parametrize("words", [("-n", "2", "--dist", "loadgroup"), ("-n", "1"), ("-p", "no:xdist")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("-n", "2", "--dist", "loadgroup"),
+        pytest.param(("-n", "1"), marks=pytest.mark.slow),
+        ("-p", "no:xdist"),
+    ],
+)
 def test_what_has_a_result_passes_without_a_run(in_pytest: Pytest, words: tuple[str, ...]) -> None:
     code, printed = in_pytest(SMALL, *words, "--durations", "3")
     assert code == 0, printed

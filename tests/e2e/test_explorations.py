@@ -82,9 +82,7 @@ def test_an_envelope_is_an_ordinary_finished_run(
 
 
 @pytest.mark.usefixtures("kept_checks")
-def test_shrinking_takes_what_the_envelope_has(
-    toycar: Workspace, finished_run: Path, tmp_path: Path
-) -> None:
+def test_shrinking_takes_what_the_envelope_has(toycar: Workspace, finished_run: Path, tmp_path: Path) -> None:
     """At most three runs: the smallest cell with the hazard, and its neighbours on both axes without it."""
     shutil.copytree(finished_run, tmp_path / "run")
     [envelope] = explore(toycar, tmp_path / "run")
@@ -105,7 +103,7 @@ def test_shrinking_takes_what_the_envelope_has(
     assert mutator.verify(smallest.run, workspace=toycar).passed
 
 
-@pytest.mark.usefixtures("kept_checks")
+@pytest.mark.usefixtures("kept_checks", "without_figures")
 def test_what_is_survived_is_challenged(toycar: Workspace, tmp_path: Path) -> None:
     """Errors that change were driven at each bound, under names of their own; a lowered bound has a run that
     shows it, and the page links it.
@@ -140,7 +138,7 @@ def test_challengers_can_be_left_out(toycar: Workspace, tmp_path: Path) -> None:
         mutator.envelope(SPEC, "A", 1, tmp_path / "other", challengers=["jump"], **options)
 
 
-@pytest.mark.usefixtures("kept_checks")
+@pytest.mark.usefixtures("kept_checks", "without_figures")
 def test_a_controller_that_gives_up_has_not_survived(toycar: Workspace, tmp_path: Path) -> None:
     """One that is disengaged once it has steered hard survives errors up to 0.6 m, of the 1 m without."""
     manifest = toycar.library / "targets" / "toycar.yaml"

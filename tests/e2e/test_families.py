@@ -18,7 +18,6 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
 from mutator.preflight import forked_golden_runs
-from mutator.report.panels import figures_panel
 from mutator.store import file_digests, trace_packing
 from mutator.store.file_digests import FileDigest
 from mutator.store.golden_verdicts import load_golden_verdicts
@@ -130,11 +129,9 @@ def test_tables_pages_and_filters_are_by_family(families: Workspace, tmp_path: P
     assert mutator.verify(run.path, workspace=families).differences == ()
 
 
-def test_frequencies_of_the_road_weigh_the_shares(
-    families: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("without_figures")
+def test_frequencies_of_the_road_weigh_the_shares(families: Workspace, tmp_path: Path) -> None:
     """A family with a `frequency` has weighted shares, as long as its file is as it was when planned."""
-    monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())  # they take seconds
     family, run = families.library / "families" / "follow.yaml", tmp_path / "run"
     part = "{from: 14, to: 17, weight: 3}, {from: 17, to: 20, weight: 1}"
     text = family.read_text().replace(

@@ -60,6 +60,7 @@ def test_an_exploration_that_was_cut_off_is_a_prefix(
     assert check_of(run, workspace).differences == ()
 
 
+@pytest.mark.usefixtures("without_figures")
 @pytest.mark.parametrize("strategy", ["planes", "random"])
 def test_a_search_is_replayed(
     exploration: Explored, tmp_path: Path, reseal: Reseal, strategy: Literal["planes", "random"]
@@ -119,6 +120,7 @@ def test_a_worse_controller_has_a_smaller_envelope(
     assert mutator.compare(runs[0], runs[0]).findings(["smaller-envelope"]) == ()
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_random_searches_stand_beside_a_search(exploration: Explored, tmp_path: Path) -> None:
     """Those of the same planes in the folder of runs: the page draws them, and is built again without them.
     A search of other faults, and one that is damaged, are not shown; a random one stands alone.

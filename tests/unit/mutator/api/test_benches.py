@@ -284,6 +284,7 @@ def _changed(what: Any, **values: Any) -> Any:
     return replace(what, **values)
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_a_bench_has_just_the_seeds_that_were_asked_for(toycar: Workspace, tmp_path: Path) -> None:
     """Report, comparison and golden runs name these seeds; seeds are not compared as if they were repeats."""
     with opened(toycar, tmp_path / "b") as bench:

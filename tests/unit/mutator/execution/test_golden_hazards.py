@@ -65,6 +65,7 @@ def records_by_scenario(run: mutator.Run) -> dict[str, list[Record]]:
     return records
 
 
+@pytest.mark.usefixtures("without_figures")
 def test_experiments_whose_golden_run_has_a_hazard_are_left_out_and_named(
     with_crash: Workspace, whole_run: mutator.Run, tmp_path: Path
 ) -> None:
