@@ -87,6 +87,10 @@ class FaultPath:
     stopped_at: tuple[str, ...]  # the components that held the fault, if it changed no actuator
 
     @property
+    def state_by_component(self) -> Mapping[str, ComponentState]:
+        return {component.name: component.state for component in self.components}
+
+    @property
     def injected(self) -> tuple[str, ...]:
         return tuple(
             component.name for component in self.components if component.state is ComponentState.INJECTED

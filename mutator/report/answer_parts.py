@@ -9,6 +9,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from mutator._common.message_text import rounded_percent
 from mutator.results.outcome_counting import first_hazard_times
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def describe_share(part: int, whole: int, plural_noun: str, *, is_sample: bool =
     because they have no rate of all.
     """
     noun = plural_noun.removesuffix("s") if whole == 1 else plural_noun
-    percent = f" ({100 * part / whole:.0f} %)" if whole and not is_sample else ""
+    percent = f" ({rounded_percent(part, whole)} %)" if whole and not is_sample else ""
     return f"{part:,} of {whole:,} {noun}{percent}"
 
 

@@ -7,6 +7,7 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
+from mutator._common.message_text import rounded_percent
 from mutator.report.fault_path_page_data import PathCounts, link_name
 from mutator.statistics.shares_with_intervals import share_with_interval
 from mutator.stpa import arrow_and_box_svg
@@ -76,7 +77,7 @@ def counts_for_drawing(
 def describe_passed_share(counts: PathCounts, link: str) -> str:
     """For example `12 of 40, 30 %`, of a sample `12 of 40`; '' if no fault reached the link."""
     passed, reached = counts.passed_by_link[link], counts.reached_by_link[link]
-    percent = "" if counts.is_sample or not reached else f", {100 * passed / reached:.0f} %"
+    percent = "" if counts.is_sample or not reached else f", {rounded_percent(passed, reached)} %"
     return f"{passed} of {reached}{percent}" if reached else ""
 
 
@@ -86,7 +87,7 @@ def describe_interval(counts: PathCounts, link: str) -> str:
     if not reached:
         return ""
     if counts.is_sample:
-        return "of those drawn"
+        return "of those that ran"
     result = share_with_interval(passed, reached)
     return f"95 % interval {100 * result.low:.0f} to {100 * result.high:.0f} %"
 

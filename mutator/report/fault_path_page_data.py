@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Experiment, Record
-from mutator.outcomes.fault_paths import FaultPath, FaultPathFinder, LinkState, UntimedPath
+from mutator.outcomes.fault_paths import ComponentState, FaultPath, FaultPathFinder, LinkState, UntimedPath
 from mutator.store.run_folder import RunFolder
 from mutator.targets.stored_target_facts import ChannelFacts
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 PATHS_SCHEMA = "report-paths/1"
 ALL_FAULT_TYPES = "all fault types"
+_CHANGED_BY_FAULT = (ComponentState.REACHED, ComponentState.PASSED)
 
 
 class _LazyFaultPaths(Mapping[str, FaultPath]):
@@ -162,8 +163,9 @@ def _components_with_columns(path: FaultPath) -> Iterator[tuple[Any, int]]:
 @dataclass(slots=True, kw_only=True)
 class PathCounts:
     """Counts over the paths of some faults. By link: how many reached its start, and how many passed it if
-    its end is recorded. By component: how many came there by a link, were injected, stopped, and masked
-    there. `masked_by_component_set` counts masked faults by the set of components that stopped them.
+    its end is recorded. By component: how many came there by a link, came there by none of them (by links
+    that are not studied, such as engagement), were injected, stopped, and masked there.
+    `masked_by_component_set` counts masked faults by the set of components that stopped them.
     `is_sample`: the faults are a sample, so that counts of links have no rate of all.
     """
 
@@ -172,6 +174,7 @@ class PathCounts:
     reached_by_link: Counter[str] = field(default_factory=Counter)
     passed_by_link: Counter[str] = field(default_factory=Counter)
     entered_by_component: Counter[str] = field(default_factory=Counter)
+    entered_unseen_by_component: Counter[str] = field(default_factory=Counter)
     injected_by_component: Counter[str] = field(default_factory=Counter)
     stopped_by_component: Counter[str] = field(default_factory=Counter)
     masked_by_component: Counter[str] = field(default_factory=Counter)
@@ -180,14 +183,20 @@ class PathCounts:
     def add(self, path: FaultPath | UntimedPath, count: int = 1) -> None:
         self.active_fault_count += count
         link_states = [(c.name, c.tip, c.state) for c in path.links]
+        entered = {tip for _, tip, state in link_states if state is LinkState.THROUGH}
         stopped = {tip for _, tip, state in link_states if state is LinkState.STOPPED}
+        changed = {n for n, state in path.state_by_component.items() if state in _CHANGED_BY_FAULT}
         for counter, names in (
             (
                 self.reached_by_link,
                 [n for n, _, state in link_states if state in (LinkState.THROUGH, LinkState.STOPPED)],
             ),
             (self.passed_by_link, [name for name, _, state in link_states if state is LinkState.THROUGH]),
-            (self.entered_by_component, {tip for _, tip, state in link_states if state is LinkState.THROUGH}),
+            (self.entered_by_component, entered),
+            (
+                self.entered_unseen_by_component,
+                changed.intersection(tip for _, tip, _ in link_states) - entered,
+            ),
             (self.injected_by_component, path.injected),
             (self.stopped_by_component, stopped.union(path.stopped_at)),
             (self.masked_by_component, path.stopped_at),

@@ -92,7 +92,9 @@ def _share_number(
     fragment = filtered_list_fragment(filters or {"q": [query]}) if result.count else ""
     counts = f"{result.count:,} of {result.of:,}"
     if isnan(result.rate):
-        return KeyNumber(value=counts, meaning=meaning, evidence="drawn; no rate of all", fragment=fragment)
+        return KeyNumber(
+            value=counts, meaning=meaning, evidence="of those that ran; no rate of all", fragment=fragment
+        )
     rate, low, high = (100 * value for value in (result.rate, result.low, result.high))
     drawn = "" if result.weighted_rate is None else " drawn; weighted"
     return KeyNumber(

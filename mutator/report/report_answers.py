@@ -3,7 +3,7 @@
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.message_text import counted
+from mutator._common.message_text import counted, rounded_percent
 from mutator.engines.engine_jobs import RunMode
 from mutator.execution.progress_text import describe_duration
 from mutator.report.answer_parts import (
@@ -201,9 +201,11 @@ def time_spent_answer(frame: "pd.DataFrame", timings: "pd.DataFrame") -> ReportA
     rows = [
         (
             fault_type_link(str(kind)),
-            ShareBar(float(s), total, f"{describe_duration(float(s))} ({100 * s / total:.0f} %)"),
+            ShareBar(
+                float(s), total, f"{describe_duration(float(s))} ({rounded_percent(float(s), total)} %)"
+            ),
         )
-        for kind, s in costs.head(MOST_FAULT_TYPES).items()
+        for kind, s in costs.head(MOST_FAULT_TYPES).astype(float).items()
         if s > 0
     ]
     return ReportAnswer(

@@ -171,7 +171,7 @@ def _describe_plan(folder: RunFolder) -> str:
     if folder.shard:
         text += f", {folder.planned_experiment_count} of them in shard {folder.shard}"
     if runs == experiments:
-        text += "; each needs its own run"
+        text += ", no two with identical runs"
     else:
         text += f", in {counted(runs, 'run')}, because experiments with identical runs share one run"
     return " ".join(filter(None, (f"{text}.", folder.early_end_note)))

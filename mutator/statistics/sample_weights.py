@@ -1,7 +1,8 @@
 """Weights of a sample's experiments, with which its shares are shares of the whole plan.
 
 An experiment stands for as many of its stratum as were planned for each one that was run, so the weights add
-up to the plan. Strata of which none was run have no weight.
+up to the plan. Strata of which none was run have no weight. What an exploration runs is chosen from the
+results before, so it is a sample of nothing: its weights are NaN.
 """
 
 import math
@@ -15,6 +16,7 @@ import numpy as np
 from mutator._common.message_text import counted
 from mutator.config.yaml_files import load_yaml
 from mutator.errors import MutatorError
+from mutator.explore.exploration_replay import is_exploration
 from mutator.model import Fault
 from mutator.results.outcome_counting import families_or_scenarios_of
 from mutator.store import plan_file
@@ -25,7 +27,7 @@ from mutator.store.run_head import CAMPAIGN_FILE
 if TYPE_CHECKING:
     import pandas as pd
 
-WEIGHT_COLUMN = "weight"  # only in frames of samples
+WEIGHT_COLUMN = "weight"  # only in frames of samples and explorations
 _WORDS_BY_DRAW = {
     SampleDraw.EVEN: "an even sample, which takes each variant equally often",
     SampleDraw.PROPORTIONAL: "a proportional sample: each fault type in each scenario keeps its share",
@@ -42,15 +44,21 @@ class SampledPlan:
 
     strata: PlanStrata | None
     left_out_count: int  # experiments in strata of which none was run
+    is_explored: bool = False  # chosen by an exploration, not drawn
 
     @property
     def is_even(self) -> bool:
         """Whether each variant was drawn equally often."""
-        return self.strata is None or self.strata.draw is SampleDraw.EVEN
+        return not self.is_explored and (self.strata is None or self.strata.draw is SampleDraw.EVEN)
 
     @property
     def note(self) -> str:
         """Say what shares are shares of."""
+        if self.is_explored:
+            return (
+                "The exploration chose each experiment by the results before it, most of them where hazards "
+                "begin. So counts of experiments are no rates."
+            )
         if self.strata is None:
             return (
                 f"The experiments are {_WORDS_BY_DRAW[SampleDraw.EVEN]}. Their run folder does not say "
@@ -69,11 +77,13 @@ class SampledPlan:
 def with_weights(frame: "pd.DataFrame", run: Path) -> "pd.DataFrame":
     """Return the frame of usable results with the column `weight` if the plan of its run folder is a sample.
 
-    The weights are NaN for an even sample whose strata are not stored.
+    The weights are NaN for an even sample whose strata are not stored, and for an exploration.
     """
     strata = load_strata(run)
     if strata is None:
-        return frame.assign(**{WEIGHT_COLUMN: math.nan}) if _is_even_sample(RunFolder(run)) else frame
+        folder = RunFolder(run)
+        has_no_rates = is_exploration(folder) or _is_even_sample(folder)
+        return frame.assign(**{WEIGHT_COLUMN: math.nan}) if has_no_rates else frame
     return with_weights_of_strata(frame, strata, plan_file.load_faults(run))
 
 
@@ -92,7 +102,11 @@ def sampled_plan(frame: "pd.DataFrame", run: Path) -> SampledPlan | None:
         return None
     strata = load_strata(run)
     weighted = round(float(np.nansum(frame[WEIGHT_COLUMN])))
-    return SampledPlan(strata=strata, left_out_count=strata.experiment_count - weighted if strata else 0)
+    return SampledPlan(
+        strata=strata,
+        left_out_count=strata.experiment_count - weighted if strata else 0,
+        is_explored=is_exploration(RunFolder(run)),
+    )
 
 
 def _strata_of_rows(frame: "pd.DataFrame", draw: SampleDraw, faults: Mapping[str, Fault]) -> "pd.Series":

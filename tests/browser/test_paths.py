@@ -117,11 +117,11 @@ def test_the_control_structure_shows_counts_and_filters_the_list(opened: "Page")
         f"{held} masked",
     ]
     cell = opened.page.text_content("#path-counts-table [data-link='commands'] td:last-child")
-    assert cell.replace("\u00a0", " ").startswith(f"{share}; of those drawn")
+    assert cell.replace("\u00a0", " ").startswith(f"{share}; of those that ran")
     opened.page.select_option("#path-counts-kind", "sensor/distance")
     assert opened.page.text_content(count) == f"0 of {held}"
     title = opened.page.text_content("#path-counts [data-link='commands'] title")
-    assert title.endswith("\nof those drawn")
+    assert title.endswith("\nof those that ran")
     opened.page.click("#path-counts [data-component='pedals']")
     assert opened.fragment == "stopped_at=pedals&kind=sensor%2Fdistance"
     assert "Stopped at: Pedals" in opened.page.inner_text("body").replace("stopped at", "Stopped at")

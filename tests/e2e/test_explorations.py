@@ -76,6 +76,8 @@ def test_an_envelope_is_an_ordinary_finished_run(
     run = mutator.load_run(tmp_path / "run", workspace=toycar)
     assert run.seal and run.verify().differences == ()
     assert run.findings == () and run.envelopes[0].curve.equals(envelope.curve)
+    report = run.report().markdown.read_text(encoding="utf-8")
+    assert "counts of experiments are no rates" in report and "; 95 % interval" not in report
     [again] = explore(toycar, tmp_path / "run")
     assert again.as_json() == envelope.as_json()
     assert mutator.load_run(tmp_path / "run", workspace=toycar).seal == run.seal

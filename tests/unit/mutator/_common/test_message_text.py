@@ -4,6 +4,7 @@ import pytest
 
 from mutator._common.message_text import (
     python_operator_hint,
+    rounded_percent,
     shortened_ids,
     unbreakable_parts,
     with_unbreakable_numbers,
@@ -62,3 +63,18 @@ def test_ids_have_eight_characters_where_that_is_unique() -> None:
     assert shortened_ids(["0123456789abcdef", "1123456789abcdef"]) == ["01234567", "11234567"]
     assert shortened_ids(["0123456789abcdef", "0123456780abcdef"]) == ["0123456789", "0123456780"]
     assert shortened_ids(["short", "shorter"]) == ["short", "shorter"]
+
+
+@pytest.mark.parametrize(
+    ("part", "whole", "text"),
+    [
+        (0, 300, "0"),
+        (1, 300, "under 1"),
+        (2, 300, "1"),
+        (298, 300, "99"),
+        (299, 300, "over 99"),
+        (300, 300, "100"),
+    ],
+)
+def test_only_none_is_0_and_only_all_is_100_percent(part: int, whole: int, text: str) -> None:
+    assert rounded_percent(part, whole) == text

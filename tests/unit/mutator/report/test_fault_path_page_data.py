@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from math import inf
 
 from mutator._common.typed_json import typed_value_from_json
@@ -119,6 +120,16 @@ def test_faults_are_counted_by_link_and_component() -> None:
     )
     assert counts.masked_by_component == {"pedals": 1}
     assert counts.masked_by_component_set == {("pedals",): 1}
+
+
+def test_components_that_a_fault_changed_by_none_of_the_links_are_counted() -> None:
+    """The pedals change although the lead does not: the controller has disengaged."""
+    away = path(ComponentState.INJECTED, ComponentState.UNCHANGED, ComponentState.REACHED)
+    stopped, behind = away.links
+    counts = PathCounts()
+    counts.add(replace(away, links=(stopped, replace(behind, state=LinkState.NOT_REACHED))))
+    counts.add(path(ComponentState.REACHED, ComponentState.REACHED, ComponentState.REACHED))
+    assert counts.entered_unseen_by_component == {"car": 1}
 
 
 def test_the_drawing_of_other_counts_is_the_one_that_the_page_changes_to(clone: Workspace) -> None:

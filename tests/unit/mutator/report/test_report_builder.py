@@ -151,7 +151,7 @@ def test_experiments_and_runs_are_counted_separately(run: Path) -> None:
     assert "Planned: 3 experiments, in 2 runs" in report_builder.write_report(run, None).markdown.read_text()
     (run / "run.json").write_text(json.dumps(HEAD | {"runs": 3}))
     assert (
-        "Planned: 3 experiments; each needs its own run.\n"
+        "Planned: 3 experiments, no two with identical runs.\n"
         in report_builder.write_report(run, None).markdown.read_text()
     )
 
