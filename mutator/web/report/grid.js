@@ -18,7 +18,7 @@ class Grid {
     { name: "method", title: "method", px: 68 },
     { name: "trigger", title: "trigger", px: 92, beside: true },
     { name: "ending", title: "outcome", px: 102, narrow: true, beside: true, cell: (t, r) => Grid.ending(t.text(r, "ending")) },
-    { name: "severity", title: "severity", px: 124, narrow: true, cell: (t, r) => Grid.severity(t.called("severity", t.text(r, "severity"))) },
+    { name: "severity", title: "severity", px: 104, narrow: true, cell: (t, r) => Grid.severity(t.called("severity", t.text(r, "severity"))) },
     { name: "t_activation", title: "activated", px: 80, time: true },
     { name: "t_manifest", title: "manifested", px: 95, time: true },
     { name: "hazards", title: "hazards", px: 72 },
@@ -59,12 +59,20 @@ class Grid {
     this.isOnPaper = false;
     this.usual = Grid.COLUMNS.filter((column) => !table.count || table.columns.has(column.name)); // some targets have no alerts
     const methods = table.columns.get("method")?.words ?? [];
-    if (methods.length === 1) this.usual = this.usual.filter((column) => column.name !== "method"); // says nothing
+    if (methods.length === 1) this.usual = Grid.#withoutMethod(this.usual);
     this.more = Grid.#more(table, metrics);
     this.#choose();
     this.#build();
     place.addEventListener("scroll", () => this.#soon(), { passive: true });
     new ResizeObserver(() => this.#soon()).observe(place);
+  }
+
+  /** The columns without that of a method, which says nothing if it is the only one. Its room shows how long faults of an exploration
+   *  are active, and how they change. */
+  static #withoutMethod(columns) {
+    const room = { variant: 30, trigger: 40 };
+    const others = columns.filter((column) => column.name !== "method");
+    return others.map((column) => ({ ...column, px: column.px + (room[column.name] ?? 0) }));
   }
 
   /** The columns that are hidden by default. Metrics have a unit and a meaning. */

@@ -67,11 +67,11 @@
     if (list.dataset.text === text) return;
     list.dataset.text = text;
     list.replaceChildren(...mine.map((job) => el("li", {}, el(`span.job-state.${job.state}`, {}, job.state), ` ${job.title}: ${job.message} `,
-      job.state === "done" ? shown(job) : null)));
+      job.state === "done" ? resultControl(job) : null)));
   }
 
-  /** What shows the result of a job: that of shrinking is an experiment of another run. */
-  const shown = (job) => (job.kind === "shrink" && job.result
+  /** The control that shows the result of a job: that of shrinking is an experiment of another run. */
+  const resultControl = (job) => (job.kind === "shrink" && job.result
     ? el("a", { href: job.result }, "Show it")
     : el("button", { type: "button", onclick: () => location.reload() }, "Show it"));
 
