@@ -123,18 +123,25 @@ def required_packages() -> frozenset[str]:
 
     If mutator is not installed, all installed packages are returned.
     """
-    installed = _installed_packages()
+    requirements = ((name, tuple(texts)) for name, (_, texts) in _installed_packages().items())
+    return _required_of(tuple(requirements))
+
+
+@lru_cache(maxsize=1)  # reading the requirements of all packages takes a tenth of a second
+def _required_of(installed: tuple[tuple[str, tuple[str, ...]], ...]) -> frozenset[str]:
+    """Return what mutator requires of the installed packages, each with its requirements."""
+    requirements = dict(installed)
     visited: set[tuple[str, str]] = set()
     pending = [(DISTRIBUTION, "")]
     while pending:
         name, extra = pending.pop()
-        if (name, extra) not in visited and name in installed:
+        if (name, extra) not in visited and name in requirements:
             visited.add((name, extra))
-            for requirement in map(Requirement, installed[name][1]):
+            for requirement in map(Requirement, requirements[name]):
                 if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
                     required_name = canonicalize_name(requirement.name)
                     pending += [(required_name, extra_name) for extra_name in ("", *requirement.extras)]
-    return frozenset(name for name, _ in visited) - {DISTRIBUTION} or frozenset(installed)
+    return frozenset(name for name, _ in visited) - {DISTRIBUTION} or frozenset(requirements)
 
 
 def packages_of_modules(modules: Iterable[str]) -> tuple[str, ...]:
