@@ -162,9 +162,9 @@ class Comparison:
 
     @cached_property
     def sheets(self) -> tuple[Sheet, ...]:
-        """The tables, most important first."""
+        """The tables, most important first. What an exploration chose to run has no rates."""
         frame = usable_pair_events(self.pairs, self.a.stratum_by_id)
-        rates, rates_by_type = rates_sheets(frame, self.names)
+        rates = () if any(self.envelopes) else rates_sheets(frame, self.names)
         spans, spans_by_type = times_sheets(frame, self.names)
         counts = (endings_cross_table(self.pairs, self.names), change_counts_sheet(self.pairs))
         metrics, metrics_by_type = metrics_sheets(self.pairs, self.a, self.b, self.names)
@@ -172,9 +172,9 @@ class Comparison:
         explored = self.envelope_changes
         return (
             *([envelopes_sheet(explored, self.names)] if explored else []),
-            *(*counts, rates, spans),
+            *(*counts, *rates[:1], spans),
             *(sheet for sheet in (severity, metrics) if sheet.lines),
-            *(rates_by_type, spans_by_type, *([metrics_by_type] if metrics.lines else [])),
+            *(*rates[1:], spans_by_type, *([metrics_by_type] if metrics.lines else [])),
         )
 
     @cached_property

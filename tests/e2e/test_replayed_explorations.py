@@ -108,6 +108,9 @@ def test_a_worse_controller_has_a_smaller_envelope(
         for path, workspace in ((exploration[1], exploration[0]), (tmp_path / "run", worse))
     ]
     comparison = mutator.compare(*runs)
+    assert "envelopes" in comparison.tables and not any(
+        name.startswith("rates") for name in comparison.tables
+    )
     [finding] = comparison.findings(["smaller-envelope"])
     assert "sensor/lane/shifted in A from 1 s" in finding.description
     record = runs[1].experiment(finding.experiment_id).record
