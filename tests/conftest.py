@@ -71,7 +71,8 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
-def pytest_runtest_teardown() -> None:
+def pytest_runtest_logfinish() -> None:
+    """After a test's fixtures are gone."""
     exempt_late_modules_from_collection()
 
 

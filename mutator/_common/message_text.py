@@ -18,7 +18,7 @@ def counted(count: int, noun: str, plural: str = "") -> str:
 def rounded_percent(part: float, whole: float) -> str:
     """Return a share as a whole percent. Only none is 0 and only all is 100: 1 of 300 is `under 1`."""
     percent = 100 * part / whole
-    if 0 < percent < 0.5:
+    if 0 < percent <= 0.5:
         return "under 1"
     return "over 99" if 99.5 <= percent < 100 else f"{percent:.0f}"
 

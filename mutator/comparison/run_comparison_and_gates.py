@@ -45,6 +45,7 @@ from mutator.comparison.paired_rate_and_time_sheets import (
 )
 from mutator.errors import MutatorError
 from mutator.explore.envelope_texts import name_of_plane
+from mutator.explore.exploration_replay import is_exploration
 from mutator.model import Experiment
 from mutator.results.result_rows import ResultRow
 from mutator.statistics.statistics_sheet import Sheet
@@ -164,7 +165,8 @@ class Comparison:
     def sheets(self) -> tuple[Sheet, ...]:
         """The tables, most important first. What an exploration chose to run has no rates."""
         frame = usable_pair_events(self.pairs, self.a.stratum_by_id)
-        rates = () if any(self.envelopes) else rates_sheets(frame, self.names)
+        is_explored = any(is_exploration(run.folder) for run in (self.a, self.b))
+        rates = () if is_explored else rates_sheets(frame, self.names)
         spans, spans_by_type = times_sheets(frame, self.names)
         counts = (endings_cross_table(self.pairs, self.names), change_counts_sheet(self.pairs))
         metrics, metrics_by_type = metrics_sheets(self.pairs, self.a, self.b, self.names)

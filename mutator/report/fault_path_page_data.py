@@ -166,7 +166,8 @@ class PathCounts:
     its end is recorded. By component: how many came there by a link, came there by none of them (by links
     that are not studied, such as engagement), were injected, stopped, and masked there.
     `masked_by_component_set` counts masked faults by the set of components that stopped them.
-    `is_sample`: the faults are a sample, so that counts of links have no rate of all.
+    `is_sample`: the faults are a sample, or an exploration chose them, so that counts of links have no rate
+    of all.
     """
 
     is_sample: bool = False
@@ -174,7 +175,7 @@ class PathCounts:
     reached_by_link: Counter[str] = field(default_factory=Counter)
     passed_by_link: Counter[str] = field(default_factory=Counter)
     entered_by_component: Counter[str] = field(default_factory=Counter)
-    entered_unseen_by_component: Counter[str] = field(default_factory=Counter)
+    entered_otherwise_by_component: Counter[str] = field(default_factory=Counter)
     injected_by_component: Counter[str] = field(default_factory=Counter)
     stopped_by_component: Counter[str] = field(default_factory=Counter)
     masked_by_component: Counter[str] = field(default_factory=Counter)
@@ -186,6 +187,7 @@ class PathCounts:
         entered = {tip for _, tip, state in link_states if state is LinkState.THROUGH}
         stopped = {tip for _, tip, state in link_states if state is LinkState.STOPPED}
         changed = {n for n, state in path.state_by_component.items() if state in _CHANGED_BY_FAULT}
+        behind_links = {tip for _, tip, _ in link_states} if path.injected else set()
         for counter, names in (
             (
                 self.reached_by_link,
@@ -194,8 +196,8 @@ class PathCounts:
             (self.passed_by_link, [name for name, _, state in link_states if state is LinkState.THROUGH]),
             (self.entered_by_component, entered),
             (
-                self.entered_unseen_by_component,
-                changed.intersection(tip for _, tip, _ in link_states) - entered,
+                self.entered_otherwise_by_component,
+                (changed & behind_links) - entered,
             ),
             (self.injected_by_component, path.injected),
             (self.stopped_by_component, stopped.union(path.stopped_at)),

@@ -8,7 +8,7 @@ from functools import partial
 from math import isnan
 from typing import TYPE_CHECKING
 
-from mutator._common.message_text import counted
+from mutator._common.message_text import counted, rounded_percent
 from mutator.model import Record
 from mutator.report.answer_parts import ALERT_BEFORE_HAZARD, SILENT_HAZARD_WARNINGS, filtered_list_fragment
 from mutator.report.reported_run import ReportedRun
@@ -98,7 +98,7 @@ def _share_number(
     rate, low, high = (100 * value for value in (result.rate, result.low, result.high))
     drawn = "" if result.weighted_rate is None else " drawn; weighted"
     return KeyNumber(
-        value=f"{rate:.0f} %",
+        value=f"{rounded_percent(rate, 100)} %",
         meaning=meaning,
         evidence=f"{counts}{drawn}; 95 % interval {low:.0f} to {high:.0f} %",
         fragment=fragment,

@@ -106,7 +106,7 @@ class ReportedRun:
 
     @property
     def sampled_plan(self) -> SampledPlan | None:
-        """What the experiments were drawn from; None if they are no sample."""
+        """What the experiments were drawn from, or that an exploration chose them; None of a whole plan."""
         return sampled_plan(self.frame, self.folder.path)
 
     @property

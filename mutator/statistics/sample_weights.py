@@ -78,6 +78,7 @@ def with_weights(frame: "pd.DataFrame", run: Path) -> "pd.DataFrame":
     """Return the frame of usable results with the column `weight` if the plan of its run folder is a sample.
 
     The weights are NaN for an even sample whose strata are not stored, and for an exploration.
+    MutatorError if the `campaign.yaml` of a bench is damaged.
     """
     strata = load_strata(run)
     if strata is None:
@@ -97,7 +98,9 @@ def with_weights_of_strata(
 
 
 def sampled_plan(frame: "pd.DataFrame", run: Path) -> SampledPlan | None:
-    """Return what the experiments of a frame from `with_weights` were drawn from; None for no sample."""
+    """Return what the experiments of a frame from `with_weights` were drawn from, or that an exploration
+    chose them; None of a whole plan.
+    """
     if WEIGHT_COLUMN not in frame:
         return None
     strata = load_strata(run)

@@ -65,8 +65,8 @@ aria-label="Control structure">{{ drawing.figure }}</div>
 <td class="number">{{ share(counts[all], name) }}</td></tr>
 {% endfor %}
 </tbody></table></div></details>
-{% if unseen %}
-<p>{{ unseen }}</p>
+{% if other_entries %}
+<p>{{ other_entries }}</p>
 {% endif %}
 <h3>Where masked faults were stopped</h3>
 <p class="quiet">Each fault that changed no actuator is counted once, in the column that
@@ -100,12 +100,12 @@ def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
     links = _links_in_order(paths)
     structure = paths.fault_paths.structure
     stops = _masked_faults_table(counts, paths)
-    unseen = _describe_unseen_entries(counts[ALL_FAULT_TYPES], paths)
+    other_entries = _describe_other_entries(counts[ALL_FAULT_TYPES], paths)
     parts = [
         "## Fault paths",
         _INTRODUCTION,
         _links_table(links, counts[ALL_FAULT_TYPES], paths).as_markdown(),
-        *([unseen] if unseen else []),
+        *([other_entries] if other_entries else []),
     ]
     parts += ["### Where masked faults were stopped", stops.as_markdown() if stops else _NONE_STOPPED]
     html = rendered(
@@ -118,7 +118,7 @@ def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
         links=links,
         label=paths.component_label,
         share=_describe_share_with_interval,
-        unseen=unseen,
+        other_entries=other_entries,
         stops=stops,
         none_stopped=_NONE_STOPPED,
     )
@@ -186,16 +186,18 @@ def _links_table(links: LinkPartsByName, counts: PathCounts, paths: RunFaultPath
     )
 
 
-def _describe_unseen_entries(counts: PathCounts, paths: RunFaultPaths) -> str:
+def _describe_other_entries(counts: PathCounts, paths: RunFaultPaths) -> str:
     """Return how many faults changed a component without getting through any of the links to it; '' if none
     did. A controller that disengages because a signal is lost is an example.
     """
     structure = paths.fault_paths.structure
     links = list(structure.links.values()) if structure else []
     sentences = []
-    for name, count in counts.entered_unseen_by_component.items():
+    for name, label in ((name, paths.component_label(name)) for name in paths.components):
+        count = counts.entered_otherwise_by_component[name]
+        if not count or name in paths.fault_paths.process_components:
+            continue
         carried = [f"“{link.label}”" for link in links if link.to == name and not link.studied]
-        label = paths.component_label(name)
         sentences.append(
             f"{count:,} of {counts.active_fault_count:,} active faults changed {label} before the process, "
             "but got through none of these links to it."

@@ -70,6 +70,8 @@ def test_ids_have_eight_characters_where_that_is_unique() -> None:
     [
         (0, 300, "0"),
         (1, 300, "under 1"),
+        (1, 200, "under 1"),
+        (199, 200, "over 99"),
         (2, 300, "1"),
         (298, 300, "99"),
         (299, 300, "over 99"),

@@ -123,13 +123,31 @@ def test_faults_are_counted_by_link_and_component() -> None:
 
 
 def test_components_that_a_fault_changed_by_none_of_the_links_are_counted() -> None:
-    """The pedals change although the lead does not: the controller has disengaged."""
-    away = path(ComponentState.INJECTED, ComponentState.UNCHANGED, ComponentState.REACHED)
-    stopped, behind = away.links
+    """The pedals change although the tracker, which feeds them, does not: the controller has disengaged. In a
+    chain, where the place of injection is unknown, nothing is counted.
+    """
+    states = {
+        "eyes": ComponentState.INJECTED,
+        "tracker": ComponentState.UNCHANGED,
+        "pedals": ComponentState.REACHED,
+    }
+    links = (
+        PathLink(name="seen", tail="eyes", tip="tracker", state=LinkState.STOPPED),
+        PathLink(name="lead", tail="tracker", tip="pedals", state=LinkState.NOT_REACHED),
+    )
+    known = UntimedPath(
+        state_by_component=states,
+        inferred_ranks={},
+        links=links,
+        reached="pedals",
+        stopped_at=(),
+        link_to_first_actuator=None,
+    )
     counts = PathCounts()
-    counts.add(replace(away, links=(stopped, replace(behind, state=LinkState.NOT_REACHED))))
-    counts.add(path(ComponentState.REACHED, ComponentState.REACHED, ComponentState.REACHED))
-    assert counts.entered_unseen_by_component == {"car": 1}
+    counts.add(known)
+    counts.add(replace(known, state_by_component=states | {"eyes": ComponentState.UNCHANGED}))
+    counts.add(path(ComponentState.INJECTED, ComponentState.REACHED, ComponentState.REACHED))
+    assert counts.entered_otherwise_by_component == {"pedals": 1}
 
 
 def test_the_drawing_of_other_counts_is_the_one_that_the_page_changes_to(clone: Workspace) -> None:
