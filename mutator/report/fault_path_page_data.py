@@ -195,10 +195,7 @@ class PathCounts:
             ),
             (self.passed_by_link, [name for name, _, state in link_states if state is LinkState.THROUGH]),
             (self.entered_by_component, entered),
-            (
-                self.entered_otherwise_by_component,
-                (changed & behind_links) - entered,
-            ),
+            (self.entered_otherwise_by_component, (changed & behind_links) - entered),
             (self.injected_by_component, path.injected),
             (self.stopped_by_component, stopped.union(path.stopped_at)),
             (self.masked_by_component, path.stopped_at),

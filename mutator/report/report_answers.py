@@ -205,7 +205,7 @@ def time_spent_answer(frame: "pd.DataFrame", timings: "pd.DataFrame") -> ReportA
                 float(s), total, f"{describe_duration(float(s))} ({rounded_percent(float(s), total)} %)"
             ),
         )
-        for kind, s in costs.head(MOST_FAULT_TYPES).astype(float).items()
+        for kind, s in costs.head(MOST_FAULT_TYPES).items()
         if s > 0
     ]
     return ReportAnswer(
