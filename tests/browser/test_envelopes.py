@@ -12,6 +12,7 @@ from mutator.report.panels import figures_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
+from tests.browser.screens import on_each_screen
 
 if TYPE_CHECKING:
     from tests.browser.conftest import Page
@@ -71,15 +72,7 @@ def test_a_cell_opens_both_runs_of_the_border(page: "Page") -> None:
     assert page.page.locator(".beside-row select").input_value() == beside
 
 
-@pytest.mark.parametrize(
-    ("width", "scheme"),
-    [
-        (1440, "light"),
-        (400, "dark"),
-        pytest.param(1440, "dark", marks=pytest.mark.slow),
-        pytest.param(400, "light", marks=pytest.mark.slow),
-    ],
-)
+@on_each_screen
 def test_it_reads_well_on_every_screen(
     page: "Page", serious_faults: Callable[[Any], list[str]], scheme: str, width: int
 ) -> None:

@@ -16,6 +16,7 @@ from mutator.results.table_reader import Results
 from mutator.results.worst_first_ranking import worst_first_ranks
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
+from tests.browser.screens import on_each_screen
 
 if TYPE_CHECKING:
     pass
@@ -164,15 +165,7 @@ def test_numbers_have_intervals_and_lead_to_their_experiments(
     assert page.inner_text("#found") == f"{hazards} of 24 experiments"
 
 
-@pytest.mark.parametrize(
-    ("width", "scheme"),
-    [
-        (1440, "light"),
-        (400, "dark"),
-        pytest.param(1440, "dark", marks=pytest.mark.slow),
-        pytest.param(400, "light", marks=pytest.mark.slow),
-    ],
-)
+@on_each_screen
 def test_axe_finds_no_serious_fault_on_the_first_screen(
     replayed: Path,
     opened: Callable[..., Any],

@@ -133,9 +133,9 @@ def test_a_check_that_fails_after_experiments_began_leaves_no_result(
     edit(toycar, file, old, new)
     out = tmp_path / "run"
     counts = []
-    for workers in (MANY_WORKERS, 1):  # a resume waits for no record
+    for _ in range(2):
         with pytest.raises(CheckFailed, match=problem.replace("+", r"\+")):
-            run_campaign(toycar, "small", out, workers=workers)
+            run_campaign(toycar, "small", out, workers=MANY_WORKERS)
         folder = RunFolder.open(out)
         counts.append(len(folder.records()))
         with pytest.raises(MutatorError, match="its verdicts are provisional"):
