@@ -91,6 +91,7 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
         **_film_and_scene_facts(folder, workspace),
         "series": series_facts_for_page(folder),
         "metrics": folder.head.metrics,
+        "has_rates": run.has_rates,
         "severity": as_json_types(folder.head.severity),
         "hazards": as_json_types(folder.head.about_hazards),
         "meanings": code_meanings_by_column(run),

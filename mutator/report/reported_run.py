@@ -110,6 +110,14 @@ class ReportedRun:
         return sampled_plan(self.frame, self.folder.path)
 
     @property
+    def has_rates(self) -> bool:
+        """Whether counts of experiments are rates of a plan: not if these are an even sample, or chosen by an
+        exploration.
+        """
+        sample = self.sampled_plan
+        return sample is None or not (sample.is_even or sample.is_explored)
+
+    @property
     def ran_count(self) -> int:
         """The number of planned experiments that ran."""
         not_run = (Status.HARNESS_ERROR.value, Status.LEFT_OUT.value)

@@ -1,6 +1,7 @@
 """The report page in the browser."""
 
 import csv
+import re
 import shutil
 from pathlib import Path
 from statistics import median
@@ -245,12 +246,13 @@ def test_a_cell_of_the_heat_map_filters_the_list(page: "Page", rows: list[dict[s
     assert page.page.inner_text(cell).endswith(f"/{len(guided)}")
 
 
-MEDIANS = """async () => {
+MAP_CELL = """async ([measure, hasRates]) => {
     const table = new Rows.Table(await Packed.read("table"));
     const place = document.createElement("div"), picker = document.createElement("select");
-    const state = { heat: "median-t_activation", chosen: new Map(), set() {} };
+    const state = { heat: measure, chosen: new Map(), set() {} };
     const metrics = [["t_activation", "s", "", "higher"]];
-    new HeatMap(place, picker, table, state, metrics).show(table.filter("", new Map()).rows);
+    const heat = new HeatMap(place, picker, table, state, { metrics, has_rates: hasRates });
+    heat.show(table.filter("", new Map()).rows);
     const cell = place.querySelector('[aria-label^="all fault types in all scenarios"]');
     const options = [...picker.querySelectorAll("option")].map((o) => o.textContent);
     return [cell.textContent, cell.getAttribute("aria-label"), options];
@@ -260,11 +262,22 @@ MEDIANS = """async () => {
 def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str, str]]) -> None:
     used = [row for row in rows if row["status"] != "harness_error"]
     times = [float(row["t_activation"]) for row in used if row["t_activation"]]
-    text, about, options = page.page.evaluate(MEDIANS)
+    text, about, options = page.page.evaluate(MAP_CELL, ["median-t_activation", True])
     assert float(text) == pytest.approx(median(times), rel=1e-2)
     ends = quantile_test(times, p=0.5).confidence_interval(0.95)
     assert f"({ends.low:.3g} to {ends.high:.3g}), over {len(times)}" in about
     assert options[-2:] == ["median t activation [s]", "worst t activation [s]"]
+
+
+def test_where_counts_are_no_rates_the_map_has_neither_percentages_nor_intervals(page: "Page") -> None:
+    abouts = {
+        (measure, has_rates): page.page.evaluate(MAP_CELL, [measure, has_rates])[1]
+        for measure in ("activated", "median-t_activation")
+        for has_rates in (True, False)
+    }
+    assert re.search(r"\d+ of \d+, .* % \(", abouts["activated", True])
+    assert re.search(r"\d+ of \d+$", abouts["activated", False])
+    assert re.search(r"\d, over \d+$", abouts["median-t_activation", False])
 
 
 def test_rows_of_the_map_with_nothing_to_count_are_named_and_left_out(

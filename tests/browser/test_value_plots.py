@@ -68,11 +68,11 @@ def test_a_click_beside_all_marks_opens_nothing(plots: Any) -> None:
     assert plots.is_hidden("#experiment")
 
 
-def test_the_share_of_hazards_at_a_reaction_time_is_read_off_in_words(plots: Any) -> None:
+def test_the_hazards_within_a_reaction_time_are_read_off_in_words(plots: Any) -> None:
     plots.fill("#reaction-time", "2.5")
     plots.press("#reaction-time", "Enter")
     text = plots.inner_text("#value-plots .reading")
-    assert re.match(r"Within 2\.5 s of the activation come \d+ of \d+ hazards of all faults \(\d+ %\)", text)
+    assert re.match(r"Within 2\.5 s of the activation come \d+ of \d+ hazards of all faults", text)
     assert "react=2.5" in plots.evaluate("location.hash")
     plots.fill("#reaction-time", "0")
     plots.press("#reaction-time", "Enter")

@@ -131,13 +131,21 @@ def test_tables_pages_and_filters_are_by_family(families: Workspace, tmp_path: P
 
 @pytest.mark.usefixtures("without_figures")
 def test_frequencies_of_the_road_weigh_the_shares(families: Workspace, tmp_path: Path) -> None:
-    """A family with a `frequency` has weighted shares, as long as its file is as it was when planned."""
+    """A family with a `frequency` has weighted shares, as long as its file is as it was when planned. An even
+    sample has counts, because the draw decides its shares.
+    """
     family, run = families.library / "families" / "follow.yaml", tmp_path / "run"
+    campaign = families.library / "campaigns" / "toy.yaml"
     part = "{from: 14, to: 17, weight: 3}, {from: 17, to: 20, weight: 1}"
     text = family.read_text().replace(
         "template:", f"frequency: {{source: A count, of: {{ego_mps: [{part}]}}}}\ntemplate:"
     )
     family.write_text(text)
+    mutator.run("toy", workspace=families, out=tmp_path / "even")
+    even = mutator.load_run(tmp_path / "even", workspace=families).report().markdown.read_text()
+    of_family = even.partition("### follow")[2].partition("## ")[0]
+    assert "| hazard |" in of_family and "%" not in of_family
+    campaign.write_text(campaign.read_text().replace("sample: 16", "sample: 16\nproportional: true"))
     mutator.run("toy", workspace=families, out=run)
     assert "weighted share |" in mutator.load_run(run, workspace=families).report().markdown.read_text()
     family.write_text(text.replace("weight: 3", "weight: 4"))

@@ -24,6 +24,10 @@ _INTRODUCTION = (
     "the 95 % intervals resample whole scenarios (bootstrap); there is none below ten scenarios, or "
     "if all have the same share."
 )
+_INTRODUCTION_WITHOUT_RATES = (
+    "Counts of the experiments in a family's concrete scenarios. Their choice decides the counts, so these "
+    "are no rates."
+)
 _WEIGHTED_NOTE = (
     "The weighted share is that of experiments in scenarios as often as they occur on the road: each counts "
     "by how often its values occur, relative to how often they are drawn."
@@ -53,16 +57,18 @@ def build_families_panel(run: ReportedRun) -> Panel | None:
     families = results_by_family(run)
     if not families:
         return None
-    about = _INTRODUCTION if any(family.experiment_count for family in families) else ""
+    introduction = _INTRODUCTION if run.has_rates else _INTRODUCTION_WITHOUT_RATES
+    about = introduction if any(family.experiment_count for family in families) else ""
     parts = ["## Families", *filter(None, (about,))]
     listed = []
     for family in families:
-        note, table = _note(family), _shares_table(family)
+        note, table = _note(family, run.has_rates), _outcomes_table(family, run.has_rates)
         parts += [f"### {family.facts.name}", f"{family.facts.title}. {note}"]
         parts += [table.as_markdown()] if table else []
         listed.append((family, note, table))
     parts.append("The maps of results and margins over the parameters are in `index.html`.")
-    sheet = families_sheet({family.facts.name: family.shares for family in families})
+    shares = {family.facts.name: family.shares for family in families}
+    files = sheet_csv_and_markdown_files([families_sheet(shares)]) if run.has_rates else {}
     html = rendered(
         _HTML_TEMPLATE,
         about=about,
@@ -74,11 +80,11 @@ def build_families_panel(run: ReportedRun) -> Panel | None:
         link="Families",
         markdown="\n\n".join(parts),
         html=html,
-        files=sheet_csv_and_markdown_files([sheet]),
+        files=files,
     )
 
 
-def _note(family: FamilyResults) -> str:
+def _note(family: FamilyResults, has_rates: bool) -> str:
     golden = family.scenarios[GOLDEN_HAZARDS_COLUMN]
     run_count, hazard_count = int(golden.notna().sum()), int((golden.fillna("") != "").sum())
     parts = [
@@ -87,16 +93,19 @@ def _note(family: FamilyResults) -> str:
     ]
     if run_count:
         parts.append(f"Without a fault, {hazard_count} of {counted(run_count, 'scenario')} had a hazard.")
-    if family.frequency_source:
+    if family.frequency_source and has_rates:
         source = " ".join(family.frequency_source.split()).rstrip(".")
         parts.append(f"{_WEIGHTED_NOTE} Source: {source}.")
     return " ".join(parts)
 
 
-def _shares_table(family: FamilyResults) -> TextTable | None:
-    """Return the table of shares; None without experiments."""
+def _outcomes_table(family: FamilyResults, has_rates: bool) -> TextTable | None:
+    """Return the table of shares, or of counts where there are no rates; None without experiments."""
     if not family.experiment_count:
         return None
+    if not has_rates:
+        counts = [[share.what, f"{share.share.count}/{share.share.of}"] for share in family.shares]
+        return TextTable(heads=["what", "experiments"], rows=counts)
     heads = ["what", "share", *(["weighted share"] if family.frequency_source else [])]
     rows = [
         [share.what, str(share.share), *([str(share.weighted)] if share.weighted else [])]

@@ -1,7 +1,7 @@
 // @ts-check
 "use strict";
 // The map of fault type by scenario. Each cell shows a share, or a metric's median or worst value, as text and colour, and
-// describes its 95 % interval. Selecting a cell sets the filters. Rows and columns with nothing to count are named below.
+// describes its 95 % interval where there are rates. Selecting a cell sets the filters. Rows and columns with nothing to count are named below.
 
 class HeatMap {
   static ROW = "kind";
@@ -9,8 +9,9 @@ class HeatMap {
   /** Facets that do not filter the map: its two axes, and the results that it counts. */
   static FREE = ["kind", "scenario", "outcome", "status", "severity", "hazards", "alerts", "warning", "reached", "stopped_at", "through"];
 
-  constructor(place, picker, table, state, metrics = []) {
+  constructor(place, picker, table, state, { metrics = [], has_rates = true } = {}) {
     this.place = place;
+    this.hasRates = has_rates; // not those of an even sample or an exploration
     this.table = table;
     this.state = state;
     const find = (name) => table.facets.find((f) => f.name === name);
@@ -73,7 +74,7 @@ class HeatMap {
     const width = this.columns.values.length + 1, height = this.rows.values.length + 1;
     if (this.table.map) {
       const cells = this.table.map.cells[measure.name];
-      this.#draw(measure, measure.value ? HeatMap.#coloured(measure, cells) : cells.map(([n, all]) => HeatMap.#shareOf(n, all)), width);
+      this.#draw(measure, measure.value ? this.#coloured(measure, cells) : cells.map(([n, all]) => this.#shareOf(n, all)), width);
       return;
     }
     const cells = Array.from({ length: width * height }, () => []);
@@ -85,21 +86,18 @@ class HeatMap {
       // last row and column: totals
       for (const at of [y * width + x, y * width + width - 1, (height - 1) * width + x, height * width - 1]) cells[at].push(value);
     }
-    this.#draw(measure, measure.value ? HeatMap.#summaries(measure, cells) : cells.map(HeatMap.#share), width);
+    this.#draw(measure, measure.value ? this.#summaries(measure, cells) : cells.map((values) => this.#shareOf(values.filter(Boolean).length, values.length)), width);
   }
 
   /** The text, description and colour (0 to 1) of each cell of a share. */
-  static #share(values) {
-    return HeatMap.#shareOf(values.filter(Boolean).length, values.length);
-  }
-
-  static #shareOf(n, all) {
-    return { all, text: `${n}/${all}`, what: all ? `${n} of ${all}, ${HeatMap.interval(n, all)}` : "", rate: all ? n / all : 0 };
+  #shareOf(n, all) {
+    const interval = this.hasRates && all ? `, ${HeatMap.interval(n, all)}` : "";
+    return { all, text: `${n}/${all}`, what: all ? `${n} of ${all}${interval}` : "", rate: all ? n / all : 0 };
   }
 
   /** The text, description and colour of each cell of a metric. The worst cell has full colour. */
-  static #summaries({ which, turn }, cells) {
-    return HeatMap.#coloured({ which, turn }, cells.map((values) => {
+  #summaries({ which, turn }, cells) {
+    return this.#coloured({ which, turn }, cells.map((values) => {
       const sorted = values.sort((a, b) => turn * (a - b)), middle = (sorted.length - 1) / 2;
       if (!sorted.length) return [NaN, 0];
       if (which === "worst") return [sorted.at(-1), sorted.length];
@@ -110,12 +108,13 @@ class HeatMap {
 
   /** The text, description and colour of values (null: no value), each given with its number of runs and, for a median, the ends
    *  of its interval. */
-  static #coloured({ which, turn }, valuesWithCounts) {
+  #coloured({ which, turn }, valuesWithCounts) {
     const values = valuesWithCounts.map(([value]) => value ?? NaN);
     const finite = values.filter(Number.isFinite), low = Math.min(...finite), high = Math.max(...finite);
     const rate = (value) => (high > low && Number.isFinite(value) ? (turn > 0 ? value - low : high - value) / (high - low) : 0);
     const what = (value, [, count, ...ends]) => {
       if (which === "worst") return `${Grid.number(value)}, a bound from ${count} runs`;
+      if (!this.hasRates) return `${Grid.number(value)}, over ${count}`;
       return `${Grid.number(value)} (${ends.length ? ends.map((end) => Grid.number(end ?? Infinity)).join(" to ") : "too few runs for an interval"}), over ${count}`;
     };
     return values.map((value, at) => ({ all: valuesWithCounts[at][1], text: Grid.number(value), what: what(value, valuesWithCounts[at]), rate: rate(value) }));

@@ -19,7 +19,7 @@ const Report = (() => {
     const data = await Packed.read("table");
     const facts = JSON.parse(find("facts").textContent);
     const table = new Rows.Table(data, facts.meanings), state = new State(() => view.update()), search = find("search");
-    const heat = new HeatMap(find("heat"), find("measure"), table, state, facts.metrics);
+    const heat = new HeatMap(find("heat"), find("measure"), table, state, facts);
     const filters = new Filters(find("facets"), find("chips"), table, state);
     const grid = new Grid(find("grid"), table, state, facts.metrics);
     const columns = new Columns(search.parentElement, grid, state);

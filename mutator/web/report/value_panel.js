@@ -82,7 +82,7 @@ class ValuePanel {
     this.caption.textContent = `${fault.name}: ${measure.about}`;
     this.plot.show(fault, measure, points, limits);
     this.counts.textContent = ValuePanel.#counted(measure, points, inactive, unlimited);
-    this.timePlot.show({ all: this.times, of: FaultValues.timesOf(table, fault.rows), name: fault.name, reaction });
+    this.timePlot.show({ all: this.times, of: FaultValues.timesOf(table, fault.rows), name: fault.name, reaction, hasRates: this.facts.has_rates });
   }
 
   static #counted(measure, points, inactive, unlimited) {
