@@ -43,26 +43,26 @@ from mutator.paper.reproduction.study_clone import (
 from mutator.paper.reproduction.study_driving import drive_study, finished_folders, is_driven, open_study
 from mutator.paper.reproduction.study_figure import draw_hazard_shares
 from mutator.paper.reproduction.study_tables import StudyTables, combined, load_tables
-from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
-
-_SMALL_CHOICES = Choices(
-    only='scenario == "S1" and fault_type in ("jamming", "speed")', limit=8, proportional=True
-)
 
 
 def write_study(
-    workspace: Workspace, campaigns: Sequence[StudyCampaign], out: Path, clone: StudyClone, docs_root: Path
+    workspace: Workspace,
+    campaigns: Sequence[StudyCampaign],
+    out: Path,
+    clone: StudyClone,
+    commit: str,
+    docs_root: Path,
 ) -> list[str]:
-    """Write tables and data set of the campaigns that are finished in `out`, and once all campaigns have
-    rows, pages and figure. Return the names of those without.
+    """Write tables and data set of the campaigns that are finished in `out`, driven at `commit`, and once all
+    campaigns have rows, pages and figure. Return the names of those without.
 
-    Other campaigns keep their rows in the tables, if these were driven at the same commit.
+    Other campaigns keep their rows in the tables, if these were driven and computed at the same commits.
     """
-    folders = finished_folders(out, [each for each in campaigns if is_driven(out, each)])
-    earlier = _earlier_tables(docs_root / TABLES_FOLDER, clone.commit)
+    folders = finished_folders(out, [each for each in campaigns if is_driven(out, each)], workspace)
+    earlier = _earlier_tables(docs_root / TABLES_FOLDER, commit, clone.commit)
     parts = [
-        rows_of_campaign(each, folders[each.name], workspace, clone.commit)
+        rows_of_campaign(each, folders[each.name], workspace, commit, clone.commit)
         if each.name in folders
         else earlier.of_campaign(each.name)
         for each in campaigns
@@ -88,15 +88,16 @@ def write_study(
     return missing
 
 
-def _earlier_tables(folder: Path, commit: str) -> StudyTables:
-    """Return the tables that other machines wrote at this commit; empty ones without, also if a file is
+def _earlier_tables(folder: Path, commit: str, tables_commit: str) -> StudyTables:
+    """Return the tables that other machines wrote at these commits; empty ones without, also if a file is
     missing or broken.
     """
     try:
         tables = load_tables(folder)
     except MutatorError:
         return combined([])
-    return tables if {row["commit"] for row in tables.rows("runs")} == {commit} else combined([])
+    commits = {(row["commit"], row["tables_commit"]) for row in tables.rows("runs")}
+    return tables if commits == {(commit, tables_commit)} else combined([])
 
 
 def _rendered_pages(study: StudyPages, clone: StudyClone) -> dict[str, bytes]:
@@ -138,16 +139,21 @@ def _run(options: argparse.Namespace) -> int:
     campaigns = [each.small() for each in STUDY] if options.small else STUDY
     chosen = [each for each in campaigns if each.name in options.only] if options.only else None
     if options.check:
-        check = StudyCheck(docs_root=docs_root, workspace=workspace, campaigns=campaigns)
+        check = StudyCheck(
+            docs_root=docs_root, clone_root=clone.root, workspace=workspace, campaigns=campaigns
+        )
         return _check(check, options.out, chosen, clone)
     open_study(options.out, clone)
-    choices = _SMALL_CHOICES if options.small else Choices()
     tell = partial(print, flush=True)
-    drive_study(
-        workspace, chosen or campaigns, options.out, workers=options.workers, choices=choices, tell=tell
-    )
-    open_study(options.out, StudyClone.of_this_package())  # nobody checked out another commit meanwhile
-    missing = write_study(workspace, campaigns, options.out, clone, docs_root)
+    drive_study(workspace, chosen or campaigns, options.out, workers=options.workers, tell=tell)
+    if (now := StudyClone.of_this_package()).commit != clone.commit:
+        raise MutatorError(
+            f"another commit, {now.commit[:12]}, was checked out meanwhile",
+            where=clone.root,
+            remedy="repeat the command",
+        )
+    commit = open_study(options.out, clone)
+    missing = write_study(workspace, campaigns, options.out, clone, commit, docs_root)
     data_set = options.out / DATA_SET_FOLDER
     if missing:
         print(f"written: {docs_root / TABLES_FOLDER}, {data_set}; pages need {', '.join(missing)}, too")

@@ -101,12 +101,16 @@ def describe_observation_margin(observation: JudgedObservation) -> str:
         if not single_changes:
             return "no single count"
         name, margin = min(single_changes, key=lambda entry: entry[1].size)
-        return f"{name}: {margin.text}"
+        return _change_of_claim(name, margin)
     parts = [(name, margin) for name, verdict, margin in margins if verdict is observation.verdict]
-    texts = [f"{name}: {margin.text}" for name, margin in parts if margin]
+    texts = [_change_of_claim(name, margin) for name, margin in parts if margin]
     if unchangeable := [name for name, margin in parts if not margin]:
         texts.append(f"{', '.join(unchangeable)}: more runs")
     return "; ".join(texts) or "all fault types of the paper"
+
+
+def _change_of_claim(name: str, margin: VerdictMargin) -> str:
+    return f"{name}: {margin.text}, then {margin.verdict.value}"
 
 
 def _margins_of(claim: JudgedClaim) -> list[tuple[str, ClaimVerdict, VerdictMargin | None]]:

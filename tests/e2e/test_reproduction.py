@@ -20,7 +20,7 @@ def reproduce(clone: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.slow
 def test_a_small_study_is_driven_written_and_checked(tmp_path: Path) -> None:
-    """A number edited by hand and an exchanged run folder are found; another commit is refused."""
+    """A number edited by hand and an exchanged run folder are found; a changed clone is refused."""
     clone, out = tmp_path / "clone", tmp_path / "study"
     subprocess.run(["git", "clone", "-q", "--no-hardlinks", str(CLONE), str(clone)], check=True)
     first = reproduce(clone, "--out", str(out), "-n", "2", "--only", "described")
@@ -46,7 +46,7 @@ def test_a_small_study_is_driven_written_and_checked(tmp_path: Path) -> None:
     shutil.rmtree(out / "runs" / "coded")
     shutil.copytree(out / "runs" / "described", out / "runs" / "coded")
     check = reproduce(clone, "--check", "--out", str(out))
-    assert check.returncode == 1 and "coded: the run folder has the seal" in check.stdout
+    assert check.returncode == 2 and "not the campaign 'coded' of the study" in check.stderr
     (clone / "target" / "new.py").write_text("")
     refused = reproduce(clone, "--out", str(out))
     assert refused.returncode == 2 and "not committed" in refused.stderr

@@ -31,9 +31,11 @@ _LEAST_RANKED = 3  # fault types
 
 
 def rows_of_campaign(
-    campaign: StudyCampaign, folder: RunFolder, workspace: Workspace, commit: str
+    campaign: StudyCampaign, folder: RunFolder, workspace: Workspace, commit: str, tables_commit: str
 ) -> dict[str, list[Row]]:
-    """Return the rows of each table, apart from those about the data set."""
+    """Return the rows of each table, apart from those about the data set. The experiments were driven at
+    `commit`; this code is of `tables_commit`.
+    """
     frame = load_usable_results(Results.up_to_date(folder.path).run / "results.csv")
     references = workspace.references
     published = load_published_numbers(references)
@@ -49,7 +51,7 @@ def rows_of_campaign(
     )
     name = campaign.name
     tables: dict[str, list[Row]] = {
-        "runs": [_run_row(campaign, folder, commit)],
+        "runs": [_run_row(campaign, folder, commit, tables_commit)],
         "fault_types": [
             {"campaign": name, "method": method, "fault_type": kind, **tally_cells(tally)}
             for (method, kind), tally in tally_by_fault_type(frame).items()
@@ -63,13 +65,13 @@ def rows_of_campaign(
         "fault_free": [
             {
                 "campaign": name,
+                "seed": str(folder.head.seed if run.seed is None else run.seed),
                 "scenario": run.scenario,
                 "changes": " ".join(run.changes),
                 "hazards": " ".join(hazard for hazard, _ in run.hazards),
                 "alerts": " ".join(f"{alert} at {time:.2f} s" for alert, time in run.alerts),
             }
             for run in load_fault_free_runs(folder, manifest)
-            if run.seed in (None, folder.head.seed)
         ],
         "agreement": [] if campaign.is_sample else list(_agreement_rows(name, frame, published)),
         "claims": list(_claim_rows(name, judged)),
@@ -108,13 +110,14 @@ def _gaps(frame: "pd.DataFrame", kinds: set[str], planned: int) -> list[str]:
     )
 
 
-def _run_row(campaign: StudyCampaign, folder: RunFolder, commit: str) -> Row:
+def _run_row(campaign: StudyCampaign, folder: RunFolder, commit: str, tables_commit: str) -> Row:
     seals, environments = seals_of(folder), folder.session_environments
     packages = {name: version for each in environments for name, version in each.packages.items()}
     return {
         "campaign": campaign.name,
         "title": campaign.title,
         "commit": commit,
+        "tables_commit": tables_commit,
         "experiments": str(folder.head.experiments),
         "plan": folder.head.plan,
         "seal": seals.seal or "",

@@ -4,7 +4,7 @@ import gzip
 import io
 import re
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,8 +67,7 @@ def write_data_set(
     rows = [_row(path) for path in folder.iterdir() if path.name not in elsewhere]
     rows += [row for row in tables.rows("data_set") if row["file"] in elsewhere]
     rows.sort(key=lambda row: row["file"])
-    text = "".join(f"{row['sha256']}  {row['file']}\n" for row in rows)
-    write_atomic(folder / _SUMS_FILE, text.encode())
+    write_atomic(folder / _SUMS_FILE, _sums(rows))
     if (size := sum(int(row["bytes"]) for row in rows)) > MOST_BYTES:
         raise MutatorError(f"a data set of {size:,} bytes", where=folder, expected=f"at most {MOST_BYTES:,}")
     return rows
@@ -89,14 +88,19 @@ def _files_of_campaign(name: str) -> tuple[str, str, str]:
     return f"experiments_{name}.parquet", f"experiments_{name}.csv.gz", f"dictionary_{name}.csv"
 
 
-def changed_files(folder: Path, rows: Sequence[Row]) -> list[str]:
-    """Return the files of a data set that are missing or differ from their digests."""
+def differing_files(folder: Path, rows: Sequence[Row], may_be_missing: Collection[str] = ()) -> list[str]:
+    """Return the files of a data set that differ from their digests, are missing, or have none."""
+    expected = {row["file"]: row["sha256"] for row in rows} | {_SUMS_FILE: digest(_sums(rows))}
+    digests = {p.name: digest(read_bounded(p)) if p.is_file() else "" for p in folder.glob("*")}
     return [
-        row["file"]
-        for row in rows
-        if not (path := folder / Path(row["file"]).name).is_file()
-        or digest(read_bounded(path)) != row["sha256"]
+        name
+        for name in sorted({*expected, *digests})
+        if expected.get(name) != digests.get(name) and (name in digests or name not in may_be_missing)
     ]
+
+
+def _sums(rows: Iterable[Row]) -> bytes:
+    return "".join(f"{row['sha256']}  {row['file']}\n" for row in rows).encode()
 
 
 def _experiments(campaign: str, run_folder: RunFolder) -> "pd.DataFrame":

@@ -57,7 +57,16 @@ class StudyPages:
 
     @cached_property
     def commit(self) -> str:
-        commits = {row["commit"] for row in self.tables.rows("runs")}
+        """The commit at which the runs were driven."""
+        return self._only_commit("commit")
+
+    @cached_property
+    def tables_commit(self) -> str:
+        """The commit whose code computed the tables."""
+        return self._only_commit("tables_commit")
+
+    def _only_commit(self, column: str) -> str:
+        commits = {row[column] for row in self.tables.rows("runs")}
         return commits.pop() if len(commits) == 1 else "different commits"
 
     def results_page(self) -> str:
@@ -177,13 +186,21 @@ class StudyPages:
     def fault_free_alerts(self) -> str:
         """Say which fault-free runs raise an alert or have a hazard."""
         titles = {campaign.name: campaign.title for campaign in self.campaigns}
-        texts = []
-        for row in self.tables.rows("fault_free"):
+        rows = self.tables.rows("fault_free")
+        seeds_by_event: dict[tuple[str, str], list[str]] = {}
+        for row in rows:
             if events := " and ".join(filter(None, (row["alerts"], row["hazards"]))):
-                texts.append(f"{row['scenario']} ({titles[row['campaign']]}): {events}")
-        if not texts:
-            return "No fault-free run of these campaigns raises an alert or has a hazard."
-        return f"Alerts and hazards of fault-free runs: {'; '.join(texts)}."
+                drive = " with ".join(filter(None, (row["scenario"], row["changes"])))
+                key = f"{drive} ({titles[row['campaign']]})", events
+                seeds_by_event.setdefault(key, []).append(row["seed"])
+        runs = f"the {len(rows)} fault-free runs of these campaigns"
+        if not seeds_by_event:
+            return f"None of {runs} raises an alert or has a hazard."
+        texts = (
+            f"{drive}{' with seeds ' + ', '.join(seeds) if len(seeds) > 1 else ''}: {events}"
+            for (drive, events), seeds in seeds_by_event.items()
+        )
+        return f"Alerts and hazards of {runs}: {'; '.join(texts)}."
 
     def summary_table(self) -> str:
         measures = (

@@ -7,8 +7,11 @@ from pathlib import Path
 from mutator._common.files import make_folder, write_atomic
 from mutator.config.yaml_files import load_yaml
 from mutator.config.yaml_writing import yaml_text
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
+_FEW_FAULTS = 'scenario == "S1" and fault_type in ("jamming", "speed")'
+WHOLE_PLAN = Choices()
 LOWER_THRESHOLD = "coded_threshold_2_75"  # the change that sets the detector's other threshold
 
 
@@ -16,7 +19,8 @@ LOWER_THRESHOLD = "coded_threshold_2_75"  # the change that sets the detector's 
 class StudyCampaign:
     """A campaign of the study: a shipped one in a reading, with more changes of the setting or more seeds.
 
-    `name` names its run folder and its rows in tables, `title` its columns on pages.
+    `name` names its run folder and its rows in tables, `title` its columns on pages. `choices` are those of
+    the run: the whole plan, except in a small study.
     """
 
     name: str
@@ -25,14 +29,17 @@ class StudyCampaign:
     reading: str
     setting_changes: tuple[str, ...] = ()
     seed_count: int = 1
+    choices: Choices = WHOLE_PLAN
 
     @property
     def is_sample(self) -> bool:
         return self.seed_count > 1
 
     def small(self) -> "StudyCampaign":
-        """Return the campaign with at most two seeds."""
-        return replace(self, seed_count=min(self.seed_count, 2))
+        """Return the campaign with at most two seeds and a few faults."""
+        seed_count = min(self.seed_count, 2)
+        choices = Choices(only=_FEW_FAULTS, limit=8 * seed_count, proportional=True)
+        return replace(self, seed_count=seed_count, choices=choices)
 
     def text(self, workspace: Workspace) -> str:
         """Return the campaign as YAML. The file may be anywhere, because it names nothing by path."""

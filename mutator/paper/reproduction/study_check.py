@@ -2,9 +2,10 @@
 
 import csv
 import io
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.message_text import counted
@@ -12,7 +13,7 @@ from mutator.audit.run_digests_and_seal import seals_of
 from mutator.errors import MutatorError
 from mutator.paper.published_numbers import load_published_numbers
 from mutator.paper.reproduction.campaign_tables import rows_of_campaign
-from mutator.paper.reproduction.data_set import changed_files, files_of_campaigns
+from mutator.paper.reproduction.data_set import differing_files, files_of_campaigns, write_data_set
 from mutator.paper.reproduction.page_rendering import StudyPages
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_clone import (
@@ -22,10 +23,12 @@ from mutator.paper.reproduction.study_clone import (
     TABLES_FOLDER,
     StudyClone,
     deciding_files,
+    files_deciding_runs,
 )
-from mutator.paper.reproduction.study_driving import finished_folders
+from mutator.paper.reproduction.study_driving import commit_of_study, finished_folders
 from mutator.paper.reproduction.study_figure import draw_hazard_shares
 from mutator.paper.reproduction.study_tables import StudyTables, combined, load_tables
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 OTHER_FIGURES_FILE = "docs/explanation/figures.csv"
@@ -35,9 +38,12 @@ _MOST_NAMED = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyCheck:
-    """What a check of the pages in `docs_root` compares: the folder that has `docs/`."""
+    """What a check of the pages in `docs_root` compares: the folder that has `docs/`. `clone_root` has the
+    licence that is in the data set, too.
+    """
 
     docs_root: Path
+    clone_root: Path
     workspace: Workspace
     campaigns: Sequence[StudyCampaign]
 
@@ -58,13 +64,9 @@ class StudyCheck:
         if out is None:
             return
         compared = self.campaigns if compared is None else compared
-        yield from self._run_problems(tables, out, compared)
-        elsewhere = files_of_campaigns(each for each in self.campaigns if each not in compared)
-        rows = [row for row in tables.rows("data_set") if row["file"] not in elsewhere]
-        for name in files_of_campaigns(compared) - {row["file"] for row in rows}:
-            yield f"{TABLES_FOLDER}/data_set.csv: no row of {name}"
-        for name in changed_files(out / DATA_SET_FOLDER, rows):
-            yield f"{out / DATA_SET_FOLDER / name}: missing, or not the file whose digest the page names"
+        folders = finished_folders(out, compared, self.workspace)
+        yield from self._run_problems(tables, out, folders)
+        yield from self._data_set_problems(tables, out / DATA_SET_FOLDER, folders)
 
     def _page_problems(self, tables: StudyTables) -> Iterator[str]:
         missing = [n for n in (RESULTS_PAGE, DIFFERENCES_PAGE, FIGURE) if not (self.docs_root / n).is_file()]
@@ -80,21 +82,39 @@ class StudyCheck:
             yield f"{FIGURE}: not the figure of the tables"
 
     def _run_problems(
-        self, tables: StudyTables, out: Path, compared: Collection[StudyCampaign]
+        self, tables: StudyTables, out: Path, folders: Mapping[str, RunFolder]
     ) -> Iterator[str]:
-        folders = finished_folders(out, compared)
+        commit, tables_commit, of_study = "", "", commit_of_study(out)
         names = {campaign.name for campaign in self.campaigns}
-        commit = ""
         for row in tables.rows("runs"):
-            commit = row["commit"]
+            commit, tables_commit = row["commit"], row["tables_commit"]
             folder = folders.get(row["campaign"])
             if row["campaign"] not in names:
                 yield f"{TABLES_FOLDER}/runs.csv: the study has no campaign '{row['campaign']}'"
             elif folder and (seal := seals_of(folder).seal) != row["seal"]:
                 yield f"{row['campaign']}: the run folder has the seal {seal}, not {row['seal']}"
-        again = combined(rows_of_campaign(c, folders[c.name], self.workspace, commit) for c in compared)
+            if folder and commit != of_study:
+                yield f"{row['campaign']}: the run folder is of commit {of_study}, not {commit}"
+        again = combined(
+            rows_of_campaign(each, folders[each.name], self.workspace, commit, tables_commit)
+            for each in self.campaigns
+            if each.name in folders
+        )
         for name in tables.without_campaigns(names - set(folders)).different_tables(again):
             yield f"{TABLES_FOLDER}/{name}: not what the run folders give"
+
+    def _data_set_problems(
+        self, tables: StudyTables, folder: Path, folders: Mapping[str, RunFolder]
+    ) -> Iterator[str]:
+        """Write the data set again, elsewhere, and compare digests."""
+        rows = tables.rows("data_set")
+        with TemporaryDirectory() as temporary:
+            again = write_data_set(Path(temporary), self.clone_root, self.campaigns, folders, tables)
+        for name in sorted({row["file"] for row in (*rows, *again) if row not in rows or row not in again}):
+            yield f"{TABLES_FOLDER}/data_set.csv: {name} is not what the run folders give"
+        elsewhere = files_of_campaigns(each for each in self.campaigns if each.name not in folders)
+        for name in differing_files(folder, rows, may_be_missing=elsewhere):
+            yield f"{folder / name}: missing, or not the file whose digest the page names"
 
 
 def campaigns_without_rows(campaigns: Iterable[StudyCampaign], tables: StudyTables) -> list[str]:
@@ -120,16 +140,22 @@ def _differences(name: str, page: str, rendered: str) -> Iterator[str]:
 
 
 def changes_since_study(docs_root: Path, clone: StudyClone) -> tuple[str, tuple[str, ...]]:
-    """Return a sentence on what changed since the study's commit, and the files that decide its figures."""
-    tables = load_tables(docs_root / TABLES_FOLDER)
-    commits = {row["commit"] for row in tables.rows("runs")}
-    if len(commits) != 1:
+    """Return sentences on what changed since the study's commits, and the files that decide its figures."""
+    pairs = {
+        (row["commit"], row["tables_commit"]) for row in load_tables(docs_root / TABLES_FOLDER).rows("runs")
+    }
+    if len(pairs) != 1:
         raise MutatorError("runs of different commits", where=docs_root / TABLES_FOLDER / "runs.csv")
-    [commit] = commits
-    changed = clone.files_changed_since(commit)
-    deciding = deciding_files(changed)
-    sentence = f"since {commit[:12]}: {counted(len(changed), 'file')} changed besides the study's own pages, "
-    return sentence + f"{len(deciding)} of them can decide a figure{_named(deciding)}", deciding
+    [(commit, tables_commit)] = pairs
+    changed, changed_later = clone.files_changed_since(commit), clone.files_changed_since(tables_commit)
+    of_runs, of_tables = files_deciding_runs(changed), deciding_files(changed_later)
+    sentences = (
+        f"runs of {commit[:12]}: {counted(len(changed), 'file')} changed since, besides pages and tables; "
+        f"{len(of_runs)} can decide a run{_named(of_runs)}",
+        f"tables of {tables_commit[:12]}: {counted(len(changed_later), 'file')} changed since; "
+        f"{len(of_tables)} can decide a figure{_named(of_tables)}",
+    )
+    return "\n".join(sentences), tuple(dict.fromkeys((*of_runs, *of_tables)))
 
 
 def other_figures(docs_root: Path, clone: StudyClone) -> Iterator[str]:

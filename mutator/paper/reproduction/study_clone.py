@@ -13,7 +13,7 @@ DIFFERENCES_PAGE = "docs/explanation/differences-from-the-paper.md"
 FIGURE = "docs/explanation/paper-results.svg"
 TABLES_FOLDER = "docs/explanation/tables"
 WRITTEN_PATHS = (RESULTS_PAGE, DIFFERENCES_PAGE, FIGURE, TABLES_FOLDER + "/")
-# what an experiment executes or is planned from, and what judges it
+# what an experiment executes or is planned from, what judges it, and what computes tables of results
 _DECIDING_PATHS = (
     *("target/", "fault_library/", "templates/", "mutator/"),
     *("constraints.txt", "pyproject.toml", "setup.py"),
@@ -23,6 +23,8 @@ _SHOWING_PATHS = tuple(
     f"mutator/{name}/"
     for name in ("cli", "api", "serve", "web", "reference", "onboarding", "exports", "report")
 )
+# what computes the study's tables from finished runs
+_STUDY_PATH = "mutator/paper/"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +62,8 @@ class StudyClone:
             )
 
     def files_changed_since(self, commit: str) -> tuple[str, ...]:
-        """Return the files that differ from another commit, also if not committed; without the study's own.
+        """Return the files that differ from another commit, also if not committed or new; without the study's
+        own.
 
         MutatorError if the clone does not have the commit.
         """
@@ -71,11 +74,18 @@ class StudyClone:
                 expected="a clone with its whole history",
                 remedy="fetch it: `git fetch --unshallow`, or `git fetch origin COMMIT`",
             )
-        return _without_written(_git_output(self.root, "diff", "--name-only", commit, "--").splitlines())
+        names = _git_output(self.root, "diff", "--name-only", commit, "--").splitlines()
+        names += _git_output(self.root, "ls-files", "--others", "--exclude-standard").splitlines()
+        return _without_written(names)
+
+
+def files_deciding_runs(files: Iterable[str]) -> tuple[str, ...]:
+    """Return those of the files that can decide how an experiment ends."""
+    return tuple(name for name in deciding_files(files) if not name.startswith(_STUDY_PATH))
 
 
 def deciding_files(files: Iterable[str]) -> tuple[str, ...]:
-    """Return those of the files that can decide a figure."""
+    """Return those of the files that can decide a figure: a run's results, or what is computed from them."""
     return tuple(
         name
         for name in files

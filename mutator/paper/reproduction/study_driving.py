@@ -1,16 +1,16 @@
 """Drives the campaigns of the study, or goes on with them, in the run folders of one study folder."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from pathlib import Path
 
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import make_folder, read_json, write_json
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
-from mutator.paper.reproduction.study_clone import StudyClone
-from mutator.store.plan_choices import Choices
+from mutator.paper.reproduction.study_clone import StudyClone, files_deciding_runs
 from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN_FILE
 from mutator.workspace import Workspace
 
 STUDY_FILE, STUDY_SCHEMA = "study.json", "study/1"
@@ -26,23 +26,30 @@ def is_driven(out: Path, campaign: StudyCampaign) -> bool:
     return RunFolder.exists(run) and RunFolder.open(run).is_finished
 
 
-def open_study(out: Path, clone: StudyClone) -> None:
-    """Begin a study in a new folder, or go on with one. MutatorError if it belongs to another commit, or if
-    the clone has changes.
+def open_study(out: Path, clone: StudyClone) -> str:
+    """Begin a study in a new folder, or go on with one; return the commit that its runs are of. MutatorError
+    if the clone has changes, or if a file that decides runs has changed since that commit.
     """
     clone.check_unchanged()
     file = out / STUDY_FILE
     if not file.exists():
         make_folder(out)
         write_json(file, {"schema": STUDY_SCHEMA, "commit": clone.commit})
-        return
-    if (commit := read_json(file, STUDY_SCHEMA).get("commit")) != clone.commit:
+    commit = commit_of_study(out)
+    if changed := files_deciding_runs(clone.files_changed_since(commit)):
         raise MutatorError(
-            f"a study of commit {str(commit)[:12]}",
+            f"a study of commit {commit[:12]}",
             where=out,
-            expected=f"one of {clone.commit[:12]}, the commit that is checked out",
+            expected=f"the files that decide runs as in {clone.commit[:12]}, which is checked out "
+            f"({len(changed)} differ, such as {changed[0]})",
             remedy="check out the commit of the study, or use a new folder",
         )
+    return commit
+
+
+def commit_of_study(out: Path) -> str:
+    """Return the commit that the runs of a study folder are of. MutatorError if the folder does not say."""
+    return str(read_json(out / STUDY_FILE, STUDY_SCHEMA).get("commit"))
 
 
 def drive_study(
@@ -51,12 +58,11 @@ def drive_study(
     out: Path,
     *,
     workers: int,
-    choices: Choices,
     tell: Callable[[str], None],
 ) -> None:
     """Drive each campaign that is not finished, also after one with a failed check or harness errors.
-    `choices.limit` is that of each seed. MutatorError at the end if one stays unfinished; at once if it is
-    interrupted, the disk is full, or a worker died.
+    MutatorError at the end if one stays unfinished; at once if it is interrupted, the disk is full, or a
+    worker died.
     """
     problems = []
     for campaign in campaigns:
@@ -66,9 +72,8 @@ def drive_study(
             continue
         tell(f"{campaign.name}: driving, in {run}")
         file = campaign.write(workspace, out)
-        of_campaign = replace(choices, limit=choices.limit and choices.limit * campaign.seed_count)
         try:
-            summary = run_campaign(workspace, file, run, workers=workers, choices=of_campaign)
+            summary = run_campaign(workspace, file, run, workers=workers, choices=campaign.choices)
         except CheckFailed as err:
             problems.append(f"{campaign.name}: {err}")
             tell(f"{campaign.name}: a check failed")
@@ -88,8 +93,12 @@ def drive_study(
         )
 
 
-def finished_folders(out: Path, campaigns: Iterable[StudyCampaign]) -> dict[str, RunFolder]:
-    """Return the verified run folders by campaign. MutatorError if one is missing, unfinished or changed."""
+def finished_folders(
+    out: Path, campaigns: Iterable[StudyCampaign], workspace: Workspace
+) -> dict[str, RunFolder]:
+    """Return the verified run folders by campaign. MutatorError if one is missing, unfinished or changed, or
+    is that of another campaign.
+    """
     folders = {}
     for campaign in campaigns:
         folder = RunFolder.open(run_path(out, campaign))
@@ -97,5 +106,13 @@ def finished_folders(out: Path, campaigns: Iterable[StudyCampaign]) -> dict[str,
             raise MutatorError("not finished", where=folder.path, remedy="drive it: leave out `--check`")
         if problems := folder.problems():
             raise problems[0]
+        text = read_bounded(folder.path / CAMPAIGN_FILE)
+        if text != campaign.text(workspace).encode() or folder.head.choices != campaign.choices:
+            raise MutatorError(
+                f"not the campaign '{campaign.name}' of the study",
+                where=folder.path,
+                expected="the campaign and the choices with which the study drives it",
+                remedy="remove the folder, and drive it again",
+            )
         folders[campaign.name] = folder
     return folders

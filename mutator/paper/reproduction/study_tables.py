@@ -28,6 +28,7 @@ HEADS: Mapping[str, tuple[str, ...]] = {
             "campaign",
             "title",
             "commit",
+            "tables_commit",
             "experiments",
             "plan",
             "seal",
@@ -41,7 +42,7 @@ HEADS: Mapping[str, tuple[str, ...]] = {
     "scenarios": ("campaign", "method", "scenario", *COUNTS),
     "alerts": ("campaign", "method", "scenario", "alert", "runs"),
     "alerts_by_fault_type": ("campaign", "scenario", "fault_type", "activated", "alerts"),
-    "fault_free": ("campaign", "scenario", "changes", "hazards", "alerts"),
+    "fault_free": ("campaign", "seed", "scenario", "changes", "hazards", "alerts"),
     "agreement": ("campaign", "fault_types", "correlation", "low", "high", "tied_here", "tied_in_paper"),
     "claims": (
         *("campaign", "observation", "observation_verdict", "claim", "says", "needed", "group", "estimate"),

@@ -12,9 +12,12 @@ PUBLISHED = load_published_numbers(CLONE / "fault_library" / "references")
 COMMIT = "ab" * 20
 
 
-def made_up_rows(campaign: StudyCampaign, commit: str = COMMIT) -> dict[str, list[Row]]:
+def made_up_rows(
+    campaign: StudyCampaign, commit: str = COMMIT, tables_commit: str = ""
+) -> dict[str, list[Row]]:
     name = {"campaign": campaign.name}
-    run = {"title": campaign.title, "commit": commit, "experiments": "11280", "plan": "p"}
+    run = {"title": campaign.title, "commit": commit, "tables_commit": tables_commit or commit}
+    run |= {"experiments": "11280", "plan": "p"}
     versions = {"python": "3.11", "mutator": "0", "packages": "numpy==2"}
     verdict = {"verdict": "holds", "change": "1.1: 5 instead of 4"}
     return {
@@ -31,7 +34,10 @@ def made_up_rows(campaign: StudyCampaign, commit: str = COMMIT) -> dict[str, lis
         "alerts_by_fault_type": [
             name | {"scenario": "S2", "fault_type": "radar/chaff", "activated": "9", "alerts": "4"}
         ],
-        "fault_free": [name | {"scenario": "S2", "changes": "", "hazards": "", "alerts": "fcw at 2.00 s"}],
+        "fault_free": [
+            name | {"seed": seed, "scenario": "S2", "changes": "", "hazards": "", "alerts": "fcw at 2.00 s"}
+            for seed in "12"[: campaign.seed_count]
+        ],
         "agreement": [
             name
             | {"fault_types": "all", "correlation": "0.86", "low": "0.5", "high": "0.9"}
@@ -59,9 +65,9 @@ def made_up_rows(campaign: StudyCampaign, commit: str = COMMIT) -> dict[str, lis
     }
 
 
-def made_up_tables(commit: str = COMMIT) -> StudyTables:
+def made_up_tables(commit: str = COMMIT, tables_commit: str = "") -> StudyTables:
     data_set: dict[str, list[Row]] = {"data_set": [{"file": "runs.csv", "bytes": "12", "sha256": "c" * 64}]}
-    return combined([*(made_up_rows(campaign, commit) for campaign in STUDY), data_set])
+    return combined([*(made_up_rows(campaign, commit, tables_commit) for campaign in STUDY), data_set])
 
 
 def made_up_pages(commit: str = COMMIT) -> StudyPages:

@@ -53,9 +53,15 @@ def test_alerts_far_from_the_papers_are_bold() -> None:
 
 def test_the_results_page_names_runs_digests_and_fault_free_alerts() -> None:
     page = made_up_pages().results_page()
-    for text in ("`coded_2_75`", "`" + "c" * 64 + "`", "fcw at 2.00 s", "commit\n`" + "ab" * 6 + "`"):
+    for text in (
+        "`coded_2_75`",
+        "`" + "c" * 64 + "`",
+        "S2 (as coded): fcw at 2.00 s",
+        "commit `" + "ab" * 6 + "`",
+    ):
         assert text in page, text
     assert made_up_pages().tables.digest() in page and "| 1.1* |" in page
+    assert "of the 7 fault-free runs" in page and "ten seeds of a tenth) with seeds 1, 2: fcw" in page
 
 
 def test_the_summary_says_by_rules_which_campaigns_are_near() -> None:

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 from mutator.paper.reproduction import study_check, study_clone
-from mutator.paper.reproduction.data_set import files_of_campaigns
 from mutator.paper.reproduction.study_campaigns import STUDY, StudyCampaign
-from mutator.paper.reproduction.study_check import StudyCheck, changes_since_study
+from mutator.paper.reproduction.study_check import DATA_SET_FOLDER, StudyCheck, changes_since_study
 from mutator.paper.reproduction.study_clone import (
     DIFFERENCES_PAGE,
     FIGURE,
@@ -19,9 +19,11 @@ from mutator.paper.reproduction.study_clone import (
     TABLES_FOLDER,
     StudyClone,
     deciding_files,
+    files_deciding_runs,
 )
 from mutator.paper.reproduction.study_driving import open_study
 from mutator.paper.reproduction.study_figure import draw_hazard_shares
+from mutator.paper.reproduction.study_tables import Row, StudyTables
 from mutator.workspace import Workspace
 
 from .made_up_study import CLONE, made_up_pages, made_up_rows, made_up_tables
@@ -57,10 +59,17 @@ def clone(tmp_path: Path) -> StudyClone:
     return StudyClone(root=root, commit=commit)
 
 
+def check_of(root: Path) -> StudyCheck:
+    return StudyCheck(docs_root=root, clone_root=CLONE, workspace=Workspace.find(root=CLONE), campaigns=STUDY)
+
+
 def problems(clone: StudyClone) -> list[str]:
-    workspace = Workspace.find(root=CLONE)
-    check = StudyCheck(docs_root=clone.root, workspace=workspace, campaigns=STUDY)
-    return list(check.problems(None))
+    return list(check_of(clone.root).problems(None))
+
+
+def test_the_pages_of_this_clone_are_those_of_its_tables() -> None:
+    """Both are in the repository, so that each edit of one of them is found here."""
+    assert list(check_of(CLONE).problems(None)) == []
 
 
 def edit(path: Path, old: str, new: str) -> None:
@@ -112,6 +121,22 @@ def test_changed_files_that_decide_figures_are_named(clone: StudyClone) -> None:
     (clone.root / "target" / "car.py").write_text("GAIN = 2\n")
     sentence, deciding = changes_since_study(clone.root, clone)
     assert deciding == ("target/car.py",) and "2 files changed" in sentence and "target/car.py" in sentence
+    (clone.root / "target" / "new.py").write_text("")
+    assert changes_since_study(clone.root, clone)[1] == ("target/car.py", "target/new.py")
+
+
+def test_files_that_decide_tables_may_change_between_runs_and_tables(clone: StudyClone) -> None:
+    """The runs are of one commit, and the tables are computed later. What changed after that is named."""
+    rules = clone.root / "mutator" / "paper" / "rules.py"
+    rules.parent.mkdir(parents=True)
+    rules.write_text("LEAST = 1\n")
+    git(clone.root, "add", "mutator")
+    git(clone.root, "commit", "-q", "-m", "rules")
+    later = StudyClone(root=clone.root, commit=git(clone.root, "rev-parse", "HEAD"))
+    made_up_tables(clone.commit, later.commit).write(clone.root / TABLES_FOLDER)
+    assert changes_since_study(clone.root, later)[1] == ()
+    rules.write_text("LEAST = 2\n")
+    assert changes_since_study(clone.root, later)[1] == ("mutator/paper/rules.py",)
 
 
 def test_doors_decide_no_figure() -> None:
@@ -123,15 +148,23 @@ def test_doors_decide_no_figure() -> None:
         "setup.py",
     )
     assert deciding_files(files) == ("mutator/model.py", "setup.py")
+    assert files_deciding_runs(("mutator/paper/measures.py", *files)) == ("mutator/model.py", "setup.py")
 
 
-def test_a_study_goes_on_only_at_its_commit_and_without_changes(clone: StudyClone, tmp_path: Path) -> None:
-    """Its own pages and tables may differ."""
+def test_a_study_goes_on_while_no_file_that_decides_runs_has_changed(
+    clone: StudyClone, tmp_path: Path
+) -> None:
+    """Other files may, its own pages and tables also without a commit. It stays of its first commit."""
     out = tmp_path / "study"
-    open_study(out, clone)
-    open_study(out, clone)
-    with pytest.raises(MutatorError, match="a study of commit"):
-        open_study(out, StudyClone(root=clone.root, commit="cd" * 20))
+    assert open_study(out, clone) == clone.commit
+    (clone.root / "README.md").write_text("Read me again.\n")
+    git(clone.root, "commit", "-q", "-a", "-m", "words")
+    later = StudyClone(root=clone.root, commit=git(clone.root, "rev-parse", "HEAD"))
+    assert open_study(out, later) == clone.commit
+    (clone.root / "target" / "car.py").write_text("GAIN = 2\n")
+    git(clone.root, "commit", "-q", "-a", "-m", "gain")
+    with pytest.raises(MutatorError, match=r"a study of commit .*1 differ, such as target/car.py"):
+        open_study(out, StudyClone(root=clone.root, commit=git(clone.root, "rev-parse", "HEAD")))
     (clone.root / "target" / "new.py").write_text("")
     with pytest.raises(MutatorError, match=r"not committed \(target/new.py\)"):
         open_study(out, clone)
@@ -190,13 +223,29 @@ def test_a_page_that_is_no_text_is_found(clone: StudyClone) -> None:
 @pytest.fixture
 def check_with_runs(clone: StudyClone, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Check:
     """Check a clone with a study folder, whose made-up runs give the rows and whose data set has one file."""
+    out = tmp_path / "study"
+    open_study(out, clone)
+    data = b"campaign\n"
+    rows: list[Row] = [{"file": "runs.csv", "bytes": str(len(data)), "sha256": digest(data)}]
+
+    def write_data_set(folder: Path, *_: object) -> list[Row]:
+        folder.mkdir(exist_ok=True)
+        (folder / "runs.csv").write_bytes(data)
+        (folder / "SHA256SUMS").write_text(f"{rows[0]['sha256']}  runs.csv\n")
+        return rows
+
+    write_data_set(out / DATA_SET_FOLDER)
+    tables = made_up_tables(clone.commit)
+    StudyTables(rows_by_name=dict(tables.rows_by_name) | {"data_set": rows}).write(clone.root / TABLES_FOLDER)
+    monkeypatch.setattr(study_check, "write_data_set", write_data_set)
+    monkeypatch.setattr(study_check, "finished_folders", lambda _, each, __: {c.name: c.name for c in each})
+    monkeypatch.setattr(study_check, "seals_of", lambda name: SimpleNamespace(seal=name))
+    monkeypatch.setattr(study_check, "rows_of_campaign", lambda c, *_: made_up_rows(c, clone.commit))
 
     def check(compared: Sequence[StudyCampaign] | None = None) -> list[str]:
-        monkeypatch.setattr(study_check, "finished_folders", lambda _, each: {c.name: c.name for c in each})
-        monkeypatch.setattr(study_check, "seals_of", lambda name: SimpleNamespace(seal=name))
-        monkeypatch.setattr(study_check, "rows_of_campaign", lambda c, *_: made_up_rows(c, clone.commit))
-        whole = StudyCheck(docs_root=clone.root, workspace=Workspace.find(root=CLONE), campaigns=STUDY)
-        return list(whole.problems(tmp_path / "study", compared))
+        """Return the problems of runs and data set: the pages are those of other rows."""
+        found = check_of(clone.root).problems(out, compared)
+        return [problem for problem in found if not problem.startswith((RESULTS_PAGE, DIFFERENCES_PAGE))]
 
     return check
 
@@ -213,20 +262,42 @@ def test_an_invented_row_is_found(
 
 
 def test_each_machine_compares_what_it_has_driven(clone: StudyClone, check_with_runs: Check) -> None:
-    """It needs a row of each of its files, and has all shared ones."""
-    found = check_with_runs(STUDY[:1])
-    files = sorted(files_of_campaigns(STUDY[:1]))
-    assert sorted(line for line in found if "no row of" in line) == [
-        f"{TABLES_FOLDER}/data_set.csv: no row of {name}" for name in files
-    ]
-    [missing] = [line for line in found if "no row of" not in line]
-    assert missing.endswith("runs.csv: missing, or not the file whose digest the page names")
+    assert check_with_runs(STUDY[:1]) == []
     edit(
         clone.root / TABLES_FOLDER / "fault_types.csv",
         "described,guided,radar/chaff,480",
         "described,guided,radar/chaff,481",
     )
     assert f"{TABLES_FOLDER}/fault_types.csv: not what the run folders give" in check_with_runs(STUDY[:1])
+
+
+@pytest.mark.parametrize("name", ["runs.csv", "SHA256SUMS", "invented.csv"])
+def test_an_edited_file_of_the_data_set_is_found(check_with_runs: Check, tmp_path: Path, name: str) -> None:
+    """Also one that was added."""
+    assert check_with_runs() == []
+    (tmp_path / "study" / DATA_SET_FOLDER / name).write_text("edited\n")
+    [problem] = check_with_runs()
+    assert f"{DATA_SET_FOLDER}/{name}: missing, or not the file whose digest the page names" in problem
+
+
+def test_a_data_set_edited_with_its_digest_is_found(
+    clone: StudyClone, check_with_runs: Check, tmp_path: Path
+) -> None:
+    """It is written again from the run folders."""
+    folder = tmp_path / "study" / DATA_SET_FOLDER
+    old, new = digest((folder / "runs.csv").read_bytes()), digest(b"edited\n!")
+    (folder / "runs.csv").write_bytes(b"edited\n!")
+    edit(folder / "SHA256SUMS", old, new)
+    edit(clone.root / TABLES_FOLDER / "data_set.csv", old, new)
+    assert check_with_runs() == [f"{TABLES_FOLDER}/data_set.csv: runs.csv is not what the run folders give"]
+
+
+def test_another_commit_in_the_tables_is_found(clone: StudyClone, check_with_runs: Check) -> None:
+    """Also where each row has it: the study folder says at which commit its runs were driven."""
+    runs = clone.root / TABLES_FOLDER / "runs.csv"
+    runs.write_text(runs.read_text().replace(clone.commit, "ab" * 20))
+    problem = f"described: the run folder is of commit {clone.commit}, not {'ab' * 20}"
+    assert problem in check_with_runs(STUDY[:1])
 
 
 def test_pages_are_not_compared_before_all_campaigns_have_rows(clone: StudyClone) -> None:

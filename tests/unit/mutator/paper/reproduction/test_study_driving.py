@@ -8,16 +8,18 @@ import pytest
 
 from mutator.errors import CheckFailed, MutatorError
 from mutator.paper.reproduction import study_driving
-from mutator.paper.reproduction.study_campaigns import STUDY
+from mutator.paper.reproduction.study_campaigns import STUDY, StudyCampaign
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 from .made_up_study import CLONE
 
+DESCRIBED, CODED, *_ = STUDY
+
 
 def drive(out: Path, lines: list[str]) -> None:
     workspace = Workspace.find(CLONE)
-    study_driving.drive_study(workspace, STUDY, out, workers=1, choices=Choices(), tell=lines.append)
+    study_driving.drive_study(workspace, STUDY, out, workers=1, tell=lines.append)
 
 
 def test_a_failed_check_ends_only_its_campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -49,3 +51,29 @@ def test_harness_errors_end_only_their_campaign(
     with pytest.raises(MutatorError, match="not finished: described: harness errors: 1"):
         drive(tmp_path, lines)
     assert sum(line.endswith("not finished") for line in lines) == driven_count
+
+
+@pytest.mark.parametrize(
+    ("campaign", "choices", "is_refused"),
+    [(DESCRIBED, Choices(), False), (CODED, Choices(), True), (DESCRIBED, Choices(limit=100), True)],
+)
+def test_an_exchanged_run_folder_is_refused(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    campaign: StudyCampaign,
+    choices: Choices,
+    is_refused: bool,
+) -> None:
+    """Before its rows are written under the name of another campaign."""
+    workspace = Workspace.find(CLONE)
+    path = study_driving.run_path(tmp_path, DESCRIBED)
+    path.mkdir(parents=True)
+    (path / "campaign.yaml").write_text(campaign.text(workspace))
+    head = SimpleNamespace(choices=choices)
+    folder: Any = SimpleNamespace(path=path, is_finished=True, problems=list, head=head)
+    monkeypatch.setattr(study_driving, "RunFolder", SimpleNamespace(open=lambda _: folder))
+    if is_refused:
+        with pytest.raises(MutatorError, match="not the campaign 'described' of the study"):
+            study_driving.finished_folders(tmp_path, [DESCRIBED], workspace)
+    else:
+        assert study_driving.finished_folders(tmp_path, [DESCRIBED], workspace) == {"described": folder}

@@ -33,14 +33,14 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
             return [*of_others, *({"file": name, "bytes": "1", "sha256": "d"} for name in driven)]
 
         monkeypatch.setattr(reproduce, "is_driven", lambda _, campaign: campaign.name in driven)
-        monkeypatch.setattr(reproduce, "finished_folders", lambda _, each: {c.name: None for c in each})
+        monkeypatch.setattr(reproduce, "finished_folders", lambda _, each, __: {c.name: None for c in each})
         monkeypatch.setattr(reproduce, "rows_of_campaign", lambda c, *_: made_up_rows(c, commit))
         monkeypatch.setattr(reproduce, "write_data_set", write_data_set)
         page = tmp_path / "docs" / "explanation" / "differences-from-the-paper.md"
         page.parent.mkdir(parents=True, exist_ok=True)
         page.write_text("Text.\n")
         clone = StudyClone(root=tmp_path, commit=commit)
-        return reproduce.write_study(Workspace.find(CLONE), STUDY, folder, clone, tmp_path)
+        return reproduce.write_study(Workspace.find(CLONE), STUDY, folder, clone, commit, tmp_path)
 
     return write
 
@@ -105,4 +105,6 @@ def test_the_data_set_keeps_files_that_were_brought_from_another_machine(
     assert (second / name).read_bytes() == (first / name).read_bytes() and not (second / "stale").exists()
     assert {row["file"] for row in again} >= set(names)
     assert all(name in (second / "SHA256SUMS").read_text() for name in names)
-    assert data_set.changed_files(second, again) == [each for each in names if each != name]
+    missing = [each for each in names if each != name]
+    assert data_set.differing_files(second, again) == missing
+    assert data_set.differing_files(second, again, may_be_missing=names) == []
