@@ -14,6 +14,18 @@ from mutator.results.table_reader import Results
 from mutator.statistics.results_frame import prepare_results
 
 TITLES = {"described": "as described", "coded": "as coded", "reference": "as coded, reference plant"}
+SATURATED = "steer_saturated"
+GROUPS = {
+    "fog, brightness, blur": [f"vision_input/{effect}" for effect in ("fog", "brightness", "blur")],
+    "rain, snow, occlusion, contrast": [
+        f"vision_input/{effect}" for effect in ("rain", "snow", "occlusion", "contrast")
+    ],
+    "chaff, invisible vehicle, both distances": [
+        *("radar/chaff", "radar/invisible_vehicle", "radar_vision/relative_distance")
+    ],
+    "camera's distance": ["vision_output/relative_distance"],
+    "path model": ["vision_output/path_model"],
+}
 LATE_S = 24.0  # for a hazard of a path model fault that begins later, the run is too short
 
 
@@ -46,6 +58,13 @@ def explaining_counts(frame: pd.DataFrame) -> Iterator[tuple[str, str]]:
     )
     camera = _of(active, "vision_output/relative_distance")
     yield "camera's distance, both methods, manifested", f"{camera['is_manifested'].sum()} of {len(camera)}"
+    unchanged = guided[~guided["is_manifested"]]["kind"].value_counts()
+    yield "did not manifest", ", ".join(f"{kind} {count}" for kind, count in unchanged.items())
+    yield "alerts", _counts_by(guided, "scenario", "is_alert")
+    alone = guided.assign(alone=guided["alerts"] == SATURATED)
+    yield f"{SATURATED} as the only alert", _counts_by(alone, "scenario", "alone")
+    for title, kinds in GROUPS.items():
+        yield f"alerts, {title}", _counts_by(guided[guided["kind"].isin(kinds)], "scenario", "is_alert")
     effects = frame[(frame["module"] == "vision_input") & (frame["method"] == "guided")]
     pairs = effects.groupby(["scenario", "row"])["is_activated"].any()
     yield "camera frames, scenarios and contexts with an activation", f"{pairs.sum()} of {len(pairs)}"
@@ -56,7 +75,11 @@ def _of(frame: pd.DataFrame, kind: str) -> pd.DataFrame:
 
 
 def _hazards_by(frame: pd.DataFrame, column: str) -> str:
-    rows = frame.groupby(column)["is_hazard"]
+    return _counts_by(frame, column, "is_hazard")
+
+
+def _counts_by(frame: pd.DataFrame, column: str, flag: str) -> str:
+    rows = frame.groupby(column)[flag]
     return ", ".join(f"{name} {part.sum()} of {len(part)}" for name, part in rows)
 
 
