@@ -265,6 +265,14 @@ class StudyPages:
         rows = [(label, *cells) for label, *cells in zip(AGREEMENT_LABELS, *columns, strict=True)]
         return _markdown(("guided", PAPER, *(c.title for c in self.whole)), rows)
 
+    def counts_table(self) -> str:
+        """Tabulate the counts that explain differences from the paper, for each whole campaign."""
+        counts: dict[str, dict[str, str]] = {}
+        for row in self.tables.rows("explaining_counts"):
+            counts.setdefault(row["what"], {})[row["campaign"]] = row["count"]
+        rows = [(what, *(cells.get(c.name, "-") for c in self.whole)) for what, cells in counts.items()]
+        return _markdown(("guided, activated", *(c.title for c in self.whole)), rows)
+
     def observations_table(self) -> str:
         """Tabulate each observation's verdict in each campaign, with what would change it."""
         rows = []

@@ -43,6 +43,7 @@ HEADS: Mapping[str, tuple[str, ...]] = {
     "alerts": ("campaign", "method", "scenario", "alert", "runs"),
     "alerts_by_fault_type": ("campaign", "scenario", "fault_type", "activated", "alerts"),
     "fault_free": ("campaign", "seed", "scenario", "changes", "hazards", "alerts"),
+    "explaining_counts": ("campaign", "what", "count"),
     "agreement": ("campaign", "fault_types", "correlation", "low", "high", "tied_here", "tied_in_paper"),
     "claims": (
         *("campaign", "observation", "observation_verdict", "claim", "says", "needed", "group", "estimate"),

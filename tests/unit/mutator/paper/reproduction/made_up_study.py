@@ -38,6 +38,7 @@ def made_up_rows(
             name | {"seed": seed, "scenario": "S2", "changes": "", "hazards": "", "alerts": "fcw at 2.00 s"}
             for seed in "12"[: campaign.seed_count]
         ],
+        "explaining_counts": [name | {"what": "speed, slower: hazards", "count": "4 of 9"}],
         "agreement": [
             name
             | {"fault_types": "all", "correlation": "0.86", "low": "0.5", "high": "0.9"}

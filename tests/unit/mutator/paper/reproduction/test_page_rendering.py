@@ -25,7 +25,7 @@ def with_cells(study: StudyPages, name: str, row_index: int, **cells: str) -> St
 def test_every_block_of_the_page_is_rendered_from_tables() -> None:
     page = (CLONE / DIFFERENCES_PAGE).read_text(encoding="utf-8")
     names = re.findall(r"<!-- study: (\w+) -->", page)
-    assert names == ["summary", "agreement", "alerts", "seeds", "seed_verdicts", "observations"]
+    assert names == ["summary", "agreement", "alerts", "counts", "seeds", "seed_verdicts", "observations"]
     assert page.count("<!-- end of study -->") == len(names)
     rendered = made_up_pages().with_blocks(page)
     assert rendered != page and made_up_pages().with_blocks(rendered) == rendered
