@@ -13,6 +13,7 @@ instead of the clone.
 
 import argparse
 import sys
+import warnings
 from collections.abc import Collection, Sequence
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,7 @@ from pathlib import Path
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.files import make_folder, write_atomic
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, MutatorWarning
 from mutator.paper.reproduction.campaign_tables import rows_of_campaign
 from mutator.paper.reproduction.data_set import write_data_set
 from mutator.paper.reproduction.page_rendering import StudyPages
@@ -40,7 +41,7 @@ from mutator.paper.reproduction.study_clone import (
     TABLES_FOLDER,
     StudyClone,
 )
-from mutator.paper.reproduction.study_driving import drive_study, finished_folders, is_driven, open_study
+from mutator.paper.reproduction.study_driving import drive_study, finished_folder, is_driven, open_study
 from mutator.paper.reproduction.study_figure import draw_hazard_shares
 from mutator.paper.reproduction.study_tables import StudyTables, combined, load_tables
 from mutator.workspace import Workspace
@@ -59,7 +60,7 @@ def write_study(
 
     Other campaigns keep their rows in the tables, if these were driven and computed at the same commits.
     """
-    folders = finished_folders(out, [each for each in campaigns if is_driven(out, each)], workspace)
+    folders = {each.name: finished_folder(out, each, workspace) for each in campaigns if is_driven(out, each)}
     earlier = _earlier_tables(docs_root / TABLES_FOLDER, commit, clone.commit)
     parts = [
         rows_of_campaign(each, folders[each.name], workspace, commit, clone.commit)
@@ -90,14 +91,23 @@ def write_study(
 
 def _earlier_tables(folder: Path, commit: str, tables_commit: str) -> StudyTables:
     """Return the tables that other machines wrote at these commits; empty ones without, also if a file is
-    missing or broken.
+    missing or broken. MutatorWarning if rows of other commits are left out.
     """
     try:
         tables = load_tables(folder)
     except MutatorError:
         return combined([])
     commits = {(row["commit"], row["tables_commit"]) for row in tables.rows("runs")}
-    return tables if commits == {(commit, tables_commit)} else combined([])
+    if commits == {(commit, tables_commit)}:
+        return tables
+    names = ", ".join(row["campaign"] for row in tables.rows("runs"))
+    warnings.warn(
+        f"{folder}: rows of {names} are left out: they are not of runs at {commit[:12]} and tables at "
+        f"{tables_commit[:12]}. Machines that share a study need the same commits",
+        MutatorWarning,
+        stacklevel=2,
+    )
+    return combined([])
 
 
 def _rendered_pages(study: StudyPages, clone: StudyClone) -> dict[str, bytes]:

@@ -73,6 +73,7 @@ def test_the_hazards_within_a_reaction_time_are_read_off_in_words(plots: Any) ->
     plots.press("#reaction-time", "Enter")
     text = plots.inner_text("#value-plots .reading")
     assert re.match(r"Within 2\.5 s of the activation come \d+ of \d+ hazards of all faults", text)
+    assert "%" not in text  # the campaign is an even sample
     assert "react=2.5" in plots.evaluate("location.hash")
     plots.fill("#reaction-time", "0")
     plots.press("#reaction-time", "Enter")

@@ -46,7 +46,7 @@ def test_a_small_study_is_driven_written_and_checked(tmp_path: Path) -> None:
     shutil.rmtree(out / "runs" / "coded")
     shutil.copytree(out / "runs" / "described", out / "runs" / "coded")
     check = reproduce(clone, "--check", "--out", str(out))
-    assert check.returncode == 2 and "not the campaign 'coded' of the study" in check.stderr
+    assert check.returncode == 1 and "not the campaign 'coded' of the study" in check.stdout
     (clone / "target" / "new.py").write_text("")
     refused = reproduce(clone, "--out", str(out))
     assert refused.returncode == 2 and "not committed" in refused.stderr

@@ -4,6 +4,7 @@ import gzip
 import io
 import re
 import shutil
+import zlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -62,8 +63,7 @@ def write_data_set(
             _write_parquet(folder / name.replace(".csv", ".parquet"), name, tables)
     for name in ("LICENSE", "CITATION.cff"):
         shutil.copyfile(clone_root / name, folder / name)
-    commits = ", ".join(sorted({row["commit"] for row in tables.rows("runs")}))
-    write_atomic(folder / "README.md", read_bounded(_README).decode().replace("{commit}", commits).encode())
+    write_atomic(folder / "README.md", _readme(tables).encode())
     rows = [_row(path) for path in folder.iterdir() if path.name not in elsewhere]
     rows += [row for row in tables.rows("data_set") if row["file"] in elsewhere]
     rows.sort(key=lambda row: row["file"])
@@ -71,6 +71,14 @@ def write_data_set(
     if (size := sum(int(row["bytes"]) for row in rows)) > MOST_BYTES:
         raise MutatorError(f"a data set of {size:,} bytes", where=folder, expected=f"at most {MOST_BYTES:,}")
     return rows
+
+
+def _readme(tables: StudyTables) -> str:
+    text = read_bounded(_README).decode()
+    for column in ("commit", "tables_commit"):
+        commits = sorted({row[column] for row in tables.rows("runs")})
+        text = text.replace(f"{{{column}}}", ", ".join(commits))
+    return text
 
 
 def _row(path: Path) -> Row:
@@ -97,6 +105,20 @@ def differing_files(folder: Path, rows: Sequence[Row], may_be_missing: Collectio
         for name in sorted({*expected, *digests})
         if expected.get(name) != digests.get(name) and (name in digests or name not in may_be_missing)
     ]
+
+
+def has_same_content(path: Path, other: Path) -> bool:
+    """Return whether two files have the same content, whatever versions have compressed them."""
+    import pandas as pd
+
+    if path.suffix not in (".parquet", ".gz"):
+        return other.is_file() and read_bounded(path) == read_bounded(other)
+    try:
+        if path.suffix == ".gz":
+            return gzip.decompress(read_bounded(path)) == gzip.decompress(read_bounded(other))
+        return pd.read_parquet(path).equals(pd.read_parquet(other))
+    except (OSError, EOFError, ValueError, zlib.error):
+        return False
 
 
 def _sums(rows: Iterable[Row]) -> bytes:

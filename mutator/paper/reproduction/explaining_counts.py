@@ -10,10 +10,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _SATURATED = "steer_saturated"
-_CAMERA_DISTANCE, _GHOST, _PATH_MODEL = (
-    *("vision_output/relative_distance", "radar/ghost_vehicle"),
-    "vision_output/path_model",
-)
+_CAMERA_DISTANCE = "vision_output/relative_distance"
+_FAR_VEHICLES = ("radar/ghost_vehicle", "radar_vision/relative_distance")
+_PATH_MODEL = "vision_output/path_model"
 _LATE_S = 24.0  # if a fault begins later, less than 6 s of the run are left
 
 
@@ -26,7 +25,7 @@ def explaining_counts(frame: "pd.DataFrame") -> Iterator[tuple[str, str]]:
     speed = guided[guided["kind"] == "car_sensors/speed"]
     for variant in ("slower", "faster"):
         yield (
-            f"speed, {variant}: hazards, and their kinds",
+            f"speed, {variant}: hazards, and the first ones",
             _hazards_by_kind(speed[speed["variant"] == variant]),
         )
     invisible = guided[guided["kind"] == "radar/invisible_vehicle"]
@@ -44,14 +43,15 @@ def explaining_counts(frame: "pd.DataFrame") -> Iterator[tuple[str, str]]:
         "path model: median time from alert to hazard",
         f"{times.median():.2f} s of {len(times)}" if len(times) else "-",
     )
-    camera = active[active["kind"] == _CAMERA_DISTANCE]
-    yield "camera's distance, both methods: manifested", _count_of(camera, "is_manifested")
+    distances = active[active["kind"] == _CAMERA_DISTANCE]
+    yield "camera's distance, both methods: manifested", _count_of(distances, "is_manifested")
     unchanged = guided[~guided["is_manifested"]]
-    is_known = unchanged["kind"].isin((_CAMERA_DISTANCE, _GHOST))
-    yield "not manifested: camera's distance and ghost vehicles", f"{is_known.sum()} of {len(unchanged)}"
-    frames = guided[guided["module"] == "vision_input"]
-    yield "camera frames: alerts", _count_of(frames, "is_alert")
-    pairs = len(frames[["scenario", "row"]].drop_duplicates())
+    is_explained = unchanged["kind"].isin((_CAMERA_DISTANCE, *_FAR_VEHICLES))
+    what = "not manifested: camera's distance, and vehicles of radar or of radar and camera"
+    yield what, f"{is_explained.sum()} of {len(unchanged)}"
+    pictures = guided[guided["module"] == "vision_input"]
+    yield "camera frames: alerts", _count_of(pictures, "is_alert")
+    pairs = len(pictures[["scenario", "row"]].drop_duplicates())
     yield "camera frames: scenarios and contexts with an activated fault", str(pairs)
     alerts = guided[guided["is_alert"]]
     yield f"alerts: {_SATURATED} alone", f"{(alerts['alerts'] == _SATURATED).sum()} of {len(alerts)}"
@@ -67,7 +67,7 @@ def _count_of(frame: "pd.DataFrame", flag: str) -> str:
 
 def _hazards_by_kind(frame: "pd.DataFrame") -> str:
     """Return text such as `30 of 30 (H3 30)`; a run counts for its first hazard."""
-    columns = {name: name.removeprefix("t_").upper() for name in frame if _is_hazard_time(str(name))}
+    columns = {name: name.removeprefix("t_").upper() for name in map(str, frame) if _is_hazard_time(name)}
     firsts = frame[frame["is_hazard"]][[*columns]].idxmin(axis=1).map(columns).value_counts(sort=False)
     kinds = ", ".join(f"{kind} {count}" for kind, count in firsts.sort_index().items())
     return _count_of(frame, "is_hazard") + (f" ({kinds})" if kinds else "")

@@ -185,19 +185,19 @@ class StudyPages:
 
     def fault_free_alerts(self) -> str:
         """Say which fault-free runs raise an alert or have a hazard."""
-        titles = {campaign.name: campaign.title for campaign in self.campaigns}
         rows = self.tables.rows("fault_free")
         seeds_by_event: dict[tuple[str, str], list[str]] = {}
-        for row in rows:
-            if events := " and ".join(filter(None, (row["alerts"], row["hazards"]))):
-                drive = " with ".join(filter(None, (row["scenario"], row["changes"])))
-                key = f"{drive} ({titles[row['campaign']]})", events
-                seeds_by_event.setdefault(key, []).append(row["seed"])
+        for campaign in self.campaigns:
+            for row in self.tables.rows("fault_free", campaign=campaign.name):
+                if events := " and ".join(filter(None, (row["alerts"], row["hazards"]))):
+                    drive = " with ".join(filter(None, (row["scenario"], row["changes"])))
+                    seeds = seeds_by_event.setdefault((f"{drive} ({campaign.title})", events), [])
+                    seeds += [row["seed"]] if campaign.is_sample else []
         runs = f"the {len(rows)} fault-free runs of these campaigns"
         if not seeds_by_event:
             return f"None of {runs} raises an alert or has a hazard."
         texts = (
-            f"{drive}{' with seeds ' + ', '.join(seeds) if len(seeds) > 1 else ''}: {events}"
+            f"{drive}{' with seed ' + ', '.join(seeds) if seeds else ''}: {events}"
             for (drive, events), seeds in seeds_by_event.items()
         )
         return f"Alerts and hazards of {runs}: {'; '.join(texts)}."
@@ -271,7 +271,9 @@ class StudyPages:
         for row in self.tables.rows("explaining_counts"):
             counts.setdefault(row["what"], {})[row["campaign"]] = row["count"]
         rows = [(what, *(cells.get(c.name, "-") for c in self.whole)) for what, cells in counts.items()]
-        return _markdown(("guided, activated", *(c.title for c in self.whole)), rows)
+        return _markdown(
+            ("guided and activated, unless it says otherwise", *(c.title for c in self.whole)), rows
+        )
 
     def observations_table(self) -> str:
         """Tabulate each observation's verdict in each campaign, with what would change it."""

@@ -13,7 +13,12 @@ from mutator.audit.run_digests_and_seal import seals_of
 from mutator.errors import MutatorError
 from mutator.paper.published_numbers import load_published_numbers
 from mutator.paper.reproduction.campaign_tables import rows_of_campaign
-from mutator.paper.reproduction.data_set import differing_files, files_of_campaigns, write_data_set
+from mutator.paper.reproduction.data_set import (
+    differing_files,
+    files_of_campaigns,
+    has_same_content,
+    write_data_set,
+)
 from mutator.paper.reproduction.page_rendering import StudyPages
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_clone import (
@@ -25,7 +30,7 @@ from mutator.paper.reproduction.study_clone import (
     deciding_files,
     files_deciding_runs,
 )
-from mutator.paper.reproduction.study_driving import commit_of_study, finished_folders
+from mutator.paper.reproduction.study_driving import commit_of_study, finished_folder
 from mutator.paper.reproduction.study_figure import draw_hazard_shares
 from mutator.paper.reproduction.study_tables import StudyTables, combined, load_tables
 from mutator.store.run_folder import RunFolder
@@ -63,8 +68,12 @@ class StudyCheck:
                 return
         if out is None:
             return
-        compared = self.campaigns if compared is None else compared
-        folders = finished_folders(out, compared, self.workspace)
+        folders = {}
+        for campaign in self.campaigns if compared is None else compared:
+            try:
+                folders[campaign.name] = finished_folder(out, campaign, self.workspace)
+            except MutatorError as err:
+                yield f"{campaign.name}: {err}"
         yield from self._run_problems(tables, out, folders)
         yield from self._data_set_problems(tables, out / DATA_SET_FOLDER, folders)
 
@@ -106,12 +115,16 @@ class StudyCheck:
     def _data_set_problems(
         self, tables: StudyTables, folder: Path, folders: Mapping[str, RunFolder]
     ) -> Iterator[str]:
-        """Write the data set again, elsewhere, and compare digests."""
+        """Write the data set again, elsewhere, and compare contents; then compare digests."""
         rows = tables.rows("data_set")
+        if not all(row["bytes"].isdecimal() for row in rows):
+            yield f"{TABLES_FOLDER}/data_set.csv: a size that is no number"
+            return
         with TemporaryDirectory() as temporary:
             again = write_data_set(Path(temporary), self.clone_root, self.campaigns, folders, tables)
-        for name in sorted({row["file"] for row in (*rows, *again) if row not in rows or row not in again}):
-            yield f"{TABLES_FOLDER}/data_set.csv: {name} is not what the run folders give"
+            for name in (row["file"] for row in again):
+                if (folder / name).is_file() and not has_same_content(folder / name, Path(temporary, name)):
+                    yield f"{folder / name}: not what the run folders give"
         elsewhere = files_of_campaigns(each for each in self.campaigns if each.name not in folders)
         for name in differing_files(folder, rows, may_be_missing=elsewhere):
             yield f"{folder / name}: missing, or not the file whose digest the page names"

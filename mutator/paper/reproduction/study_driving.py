@@ -49,7 +49,10 @@ def open_study(out: Path, clone: StudyClone) -> str:
 
 def commit_of_study(out: Path) -> str:
     """Return the commit that the runs of a study folder are of. MutatorError if the folder does not say."""
-    return str(read_json(out / STUDY_FILE, STUDY_SCHEMA).get("commit"))
+    commit = read_json(out / STUDY_FILE, STUDY_SCHEMA).get("commit")
+    if not isinstance(commit, str):
+        raise MutatorError("no commit", where=out / STUDY_FILE, expected="the commit of the study's runs")
+    return commit
 
 
 def drive_study(
@@ -68,6 +71,7 @@ def drive_study(
     for campaign in campaigns:
         run = run_path(out, campaign)
         if is_driven(out, campaign):
+            finished_folder(out, campaign, workspace)
             tell(f"{campaign.name}: finished")
             continue
         tell(f"{campaign.name}: driving, in {run}")
@@ -93,26 +97,21 @@ def drive_study(
         )
 
 
-def finished_folders(
-    out: Path, campaigns: Iterable[StudyCampaign], workspace: Workspace
-) -> dict[str, RunFolder]:
-    """Return the verified run folders by campaign. MutatorError if one is missing, unfinished or changed, or
+def finished_folder(out: Path, campaign: StudyCampaign, workspace: Workspace) -> RunFolder:
+    """Return the verified run folder of a campaign. MutatorError if it is missing, unfinished or changed, or
     is that of another campaign.
     """
-    folders = {}
-    for campaign in campaigns:
-        folder = RunFolder.open(run_path(out, campaign))
-        if not folder.is_finished:
-            raise MutatorError("not finished", where=folder.path, remedy="drive it: leave out `--check`")
-        if problems := folder.problems():
-            raise problems[0]
-        text = read_bounded(folder.path / CAMPAIGN_FILE)
-        if text != campaign.text(workspace).encode() or folder.head.choices != campaign.choices:
-            raise MutatorError(
-                f"not the campaign '{campaign.name}' of the study",
-                where=folder.path,
-                expected="the campaign and the choices with which the study drives it",
-                remedy="remove the folder, and drive it again",
-            )
-        folders[campaign.name] = folder
-    return folders
+    folder = RunFolder.open(run_path(out, campaign))
+    if not folder.is_finished:
+        raise MutatorError("not finished", where=folder.path, remedy="drive it: leave out `--check`")
+    if problems := folder.problems():
+        raise problems[0]
+    text = read_bounded(folder.path / CAMPAIGN_FILE)
+    if text != campaign.text(workspace).encode() or folder.head.choices != campaign.choices:
+        raise MutatorError(
+            f"not the campaign '{campaign.name}' of the study",
+            where=folder.path,
+            expected="the campaign and the choices with which the study drives it",
+            remedy="remove the folder, and drive it again",
+        )
+    return folder

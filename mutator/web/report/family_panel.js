@@ -18,12 +18,13 @@ class FamilyPlot extends ValuePlot {
 class FamilyPanel {
   static HAZARDS = "hazards"; // the choice that is no parameter
 
-  /** `state` opens experiments. */
-  constructor(place, table, state) {
+  /** `state` opens experiments; `has_rates`: whether counts of experiments are rates of a plan. */
+  constructor(place, table, state, { has_rates = true } = {}) {
     if (!place) return;
     this.place = place;
     this.table = table;
     this.state = state;
+    this.hasRates = has_rates;
     const show = async () => {
       if (this.observer) this.observer.disconnect();
       this.observer = null;
@@ -66,7 +67,7 @@ class FamilyPanel {
     this.chosen = family;
     this.scenarios = this.#worstByScenario(family);
     this.x.replaceChildren(...copies());
-    this.y.replaceChildren(...copies(), el("option", { value: FamilyPanel.HAZARDS }, "experiments with a hazard [%]"));
+    this.y.replaceChildren(...copies(), el("option", { value: FamilyPanel.HAZARDS }, `experiments with a hazard${this.hasRates ? " [%]" : ""}`));
     this.y.value = parameters[1]?.key ?? FamilyPanel.HAZARDS;
     this.over.replaceChildren(...copies());
     const metrics = this.data.metrics.filter(({ name }) => goldens.metrics[name]);
@@ -117,7 +118,10 @@ class FamilyPanel {
   /** An axis of the map, with the place of a scenario on it.
    *  @returns {{axis: string, unit: string, of: (scenario: any) => number, ticks?: (chart: any, places: number[]) => string[]}} */
   #axisOfRows(key) {
-    if (key === FamilyPanel.HAZARDS) return { axis: "experiments with a hazard", unit: "%", of: ({ hazards, count }) => (100 * hazards) / count };
+    if (key === FamilyPanel.HAZARDS) {
+      const axis = "experiments with a hazard";
+      return this.hasRates ? { axis, unit: "%", of: ({ hazards, count }) => (100 * hazards) / count } : { axis, unit: "", of: ({ hazards }) => hazards };
+    }
     const { table } = this, rows = [...this.scenarios.values()].map(({ row }) => row), value = (row) => table.text(row, key);
     const axis = this.#axis(key, rows.map(value));
     return { ...axis, of: ({ row }) => axis.at(value(row)) };

@@ -26,7 +26,7 @@ const Report = (() => {
     const actions = { move: (by) => grid.move(by), close: () => view.close(), place: () => grid.placeOf(state.experiment) };
     const experiment = new Experiment(find("experiment"), table, state, { ...facts, run: facts.series.alone ? () => "DIR" : runFolder }, actions);
     const values = new ValuePanel(find("value-plots"), table, state, facts);
-    new FamilyPanel(find("family-plots"), table, state);
+    new FamilyPanel(find("family-plots"), table, state, facts);
     const view = viewOf({ table, state, search, heat, filters, grid, columns, experiment, values });
     searching(search, state);
     keyboard({ grid, experiment, search, close: view.close });

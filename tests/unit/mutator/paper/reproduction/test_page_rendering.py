@@ -61,7 +61,7 @@ def test_the_results_page_names_runs_digests_and_fault_free_alerts() -> None:
     ):
         assert text in page, text
     assert made_up_pages().tables.digest() in page and "| 1.1* |" in page
-    assert "of the 7 fault-free runs" in page and "ten seeds of a tenth) with seeds 1, 2: fcw" in page
+    assert "of the 7 fault-free runs" in page and "ten seeds of a tenth) with seed 1, 2: fcw" in page
 
 
 def test_the_summary_says_by_rules_which_campaigns_are_near() -> None:

@@ -239,14 +239,14 @@ def check_with_runs(clone: StudyClone, tmp_path: Path, monkeypatch: pytest.Monke
     tables = made_up_tables(clone.commit)
     StudyTables(rows_by_name=dict(tables.rows_by_name) | {"data_set": rows}).write(clone.root / TABLES_FOLDER)
     monkeypatch.setattr(study_check, "write_data_set", write_data_set)
-    monkeypatch.setattr(study_check, "finished_folders", lambda _, each, __: {c.name: c.name for c in each})
+    monkeypatch.setattr(study_check, "finished_folder", lambda _, campaign, __: campaign.name)
     monkeypatch.setattr(study_check, "seals_of", lambda name: SimpleNamespace(seal=name))
     monkeypatch.setattr(study_check, "rows_of_campaign", lambda c, *_: made_up_rows(c, clone.commit))
 
     def check(compared: Sequence[StudyCampaign] | None = None) -> list[str]:
         """Return the problems of runs and data set: the pages are those of other rows."""
-        found = check_of(clone.root).problems(out, compared)
-        return [problem for problem in found if not problem.startswith((RESULTS_PAGE, DIFFERENCES_PAGE))]
+        problems = check_of(clone.root).problems(out, compared)
+        return [each for each in problems if not each.startswith((RESULTS_PAGE, DIFFERENCES_PAGE))]
 
     return check
 
@@ -277,7 +277,7 @@ def test_an_edited_file_of_the_data_set_is_found(check_with_runs: Check, tmp_pat
     """Also one that was added."""
     assert check_with_runs() == []
     (tmp_path / "study" / DATA_SET_FOLDER / name).write_text("edited\n")
-    [problem] = check_with_runs()
+    problem = check_with_runs()[-1]
     assert f"{DATA_SET_FOLDER}/{name}: missing, or not the file whose digest the page names" in problem
 
 
@@ -290,7 +290,7 @@ def test_a_data_set_edited_with_its_digest_is_found(
     (folder / "runs.csv").write_bytes(b"edited\n!")
     edit(folder / "SHA256SUMS", old, new)
     edit(clone.root / TABLES_FOLDER / "data_set.csv", old, new)
-    assert check_with_runs() == [f"{TABLES_FOLDER}/data_set.csv: runs.csv is not what the run folders give"]
+    assert check_with_runs() == [f"{folder / 'runs.csv'}: not what the run folders give"]
 
 
 def test_another_commit_in_the_tables_is_found(clone: StudyClone, check_with_runs: Check) -> None:
@@ -307,3 +307,18 @@ def test_pages_are_not_compared_before_all_campaigns_have_rows(clone: StudyClone
     tables.without_campaigns(others).write(clone.root / TABLES_FOLDER)
     [problem] = problems(clone)
     assert problem.startswith(f"{TABLES_FOLDER}: no rows of coded, coded_2_75, reference, ")
+
+
+def test_an_exchanged_run_folder_is_a_problem_beside_others(
+    clone: StudyClone, check_with_runs: Check, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def find(_: Path, campaign: StudyCampaign, __: Workspace) -> str:
+        if campaign.name == "coded":
+            raise MutatorError("not the campaign 'coded' of the study")
+        return campaign.name
+
+    monkeypatch.setattr(study_check, "finished_folder", find)
+    edit(clone.root / TABLES_FOLDER / "runs.csv", ",described,", ",exchanged,")
+    problems = check_with_runs()
+    assert "coded: not the campaign 'coded' of the study" in problems
+    assert any(problem.startswith("described: the run folder has the seal") for problem in problems)

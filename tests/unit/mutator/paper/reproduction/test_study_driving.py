@@ -71,9 +71,13 @@ def test_an_exchanged_run_folder_is_refused(
     (path / "campaign.yaml").write_text(campaign.text(workspace))
     head = SimpleNamespace(choices=choices)
     folder: Any = SimpleNamespace(path=path, is_finished=True, problems=list, head=head)
-    monkeypatch.setattr(study_driving, "RunFolder", SimpleNamespace(open=lambda _: folder))
-    if is_refused:
-        with pytest.raises(MutatorError, match="not the campaign 'described' of the study"):
-            study_driving.finished_folders(tmp_path, [DESCRIBED], workspace)
-    else:
-        assert study_driving.finished_folders(tmp_path, [DESCRIBED], workspace) == {"described": folder}
+    monkeypatch.setattr(
+        study_driving, "RunFolder", SimpleNamespace(open=lambda _: folder, exists=lambda _: True)
+    )
+    if not is_refused:
+        assert study_driving.finished_folder(tmp_path, DESCRIBED, workspace) is folder
+        return
+    with pytest.raises(MutatorError, match="not the campaign 'described' of the study"):
+        study_driving.finished_folder(tmp_path, DESCRIBED, workspace)
+    with pytest.raises(MutatorError, match="not the campaign 'described'"):  # also before driving others
+        drive(tmp_path, [])
