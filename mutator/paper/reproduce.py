@@ -3,9 +3,8 @@
     python -m mutator.paper.reproduce --out DIR            # drive what is missing, then write
     python -m mutator.paper.reproduce --check [--out DIR]  # compare what is written, and say what has changed
 
-`--only NAME` drives or compares one campaign, so that machines can share the work, one after the other: all
-at the same commit, each with the tables that the one before wrote. Pages are written once all campaigns have
-rows.
+`--only NAME` drives or compares one campaign, so that machines can share the work, one after the other, each
+with the tables that the one before wrote. Pages are written once all campaigns have rows.
 
 `--small` drives a few faults in each campaign, to try the whole way in minutes. It writes its pages into DIR
 instead of the clone.
@@ -58,12 +57,13 @@ def write_study(
     """Write tables and data set of the campaigns that are finished in `out`, driven at `commit`, and once all
     campaigns have rows, pages and figure. Return the names of those without.
 
-    Other campaigns keep their rows in the tables, if these were driven and computed at the same commits.
+    Other campaigns keep their rows in the tables, if the same files decide these.
     """
     folders = {each.name: finished_folder(out, each, workspace) for each in campaigns if is_driven(out, each)}
-    earlier = _earlier_tables(docs_root / TABLES_FOLDER, commit, clone.commit)
+    earlier = _tables_to_keep(_earlier_tables(docs_root), commit, clone)
+    tables_commit = next((row["tables_commit"] for row in earlier.rows("runs")), clone.commit)
     parts = [
-        rows_of_campaign(each, folders[each.name], workspace, commit, clone.commit)
+        rows_of_campaign(each, folders[each.name], workspace, commit, tables_commit)
         if each.name in folders
         else earlier.of_campaign(each.name)
         for each in campaigns
@@ -89,21 +89,28 @@ def write_study(
     return missing
 
 
-def _earlier_tables(folder: Path, commit: str, tables_commit: str) -> StudyTables:
-    """Return the tables that other machines wrote at these commits; empty ones without, also if a file is
-    missing or broken. MutatorWarning if rows of other commits are left out.
-    """
+def _earlier_tables(docs_root: Path) -> StudyTables:
+    """Return the tables that are there; empty ones if a file is missing or broken."""
     try:
-        tables = load_tables(folder)
+        return load_tables(docs_root / TABLES_FOLDER)
     except MutatorError:
         return combined([])
+
+
+def _tables_to_keep(tables: StudyTables, commit: str, clone: StudyClone) -> StudyTables:
+    """Return tables of runs at a commit, if this clone would compute the same; otherwise empty ones, with a
+    MutatorWarning.
+    """
     commits = {(row["commit"], row["tables_commit"]) for row in tables.rows("runs")}
-    if commits == {(commit, tables_commit)}:
+    if not commits or commits == {(commit, clone.commit)}:
+        return tables
+    [(runs_commit, tables_commit), *others] = commits
+    if not others and runs_commit == commit and clone.decides_figures_as(tables_commit):
         return tables
     names = ", ".join(row["campaign"] for row in tables.rows("runs"))
     warnings.warn(
-        f"{folder}: rows of {names} are left out: they are not of runs at {commit[:12]} and tables at "
-        f"{tables_commit[:12]}. Machines that share a study need the same commits",
+        f"earlier rows of {names} are left out: other files decided them than those of runs at {commit[:12]} "
+        f"and tables at {clone.commit[:12]}",
         MutatorWarning,
         stacklevel=2,
     )
@@ -153,7 +160,8 @@ def _run(options: argparse.Namespace) -> int:
             docs_root=docs_root, clone_root=clone.root, workspace=workspace, campaigns=campaigns
         )
         return _check(check, options.out, chosen, clone)
-    open_study(options.out, clone)
+    elsewhere = next((row["commit"] for row in _earlier_tables(docs_root).rows("runs")), "")
+    open_study(options.out, clone, elsewhere)
     tell = partial(print, flush=True)
     drive_study(workspace, chosen or campaigns, options.out, workers=options.workers, tell=tell)
     if (now := StudyClone.of_this_package()).commit != clone.commit:

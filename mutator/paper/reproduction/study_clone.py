@@ -61,13 +61,24 @@ class StudyClone:
                 remedy="commit or remove them, or drive from another clone",
             )
 
+    def decides_runs_as(self, commit: str) -> bool:
+        """Return whether no file that decides runs differs from that commit; false if it is not there."""
+        return self._has_commit(commit) and not files_deciding_runs(self.files_changed_since(commit))
+
+    def decides_figures_as(self, commit: str) -> bool:
+        """Return whether no file that decides figures differs from that commit; false if it is not there."""
+        return self._has_commit(commit) and not deciding_files(self.files_changed_since(commit))
+
+    def _has_commit(self, commit: str) -> bool:
+        return _git_output(self.root, "cat-file", "-t", commit).startswith("commit")
+
     def files_changed_since(self, commit: str) -> tuple[str, ...]:
         """Return the files that differ from another commit, also if not committed or new; without the study's
         own.
 
         MutatorError if the clone does not have the commit.
         """
-        if not _git_output(self.root, "cat-file", "-t", commit).startswith("commit"):
+        if not self._has_commit(commit):
             raise MutatorError(
                 f"commit {commit[:12]} is not in this clone",
                 where=self.root,

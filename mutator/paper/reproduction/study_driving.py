@@ -26,15 +26,17 @@ def is_driven(out: Path, campaign: StudyCampaign) -> bool:
     return RunFolder.exists(run) and RunFolder.open(run).is_finished
 
 
-def open_study(out: Path, clone: StudyClone) -> str:
-    """Begin a study in a new folder, or go on with one; return the commit that its runs are of. MutatorError
-    if the clone has changes, or if a file that decides runs has changed since that commit.
+def open_study(out: Path, clone: StudyClone, commit_elsewhere: str = "") -> str:
+    """Begin a study in a new folder, or go on with one; return the commit that its runs are of: in a new
+    folder, that of runs elsewhere, if the same files decide them. MutatorError if the clone has changes, or
+    if a file that decides runs has changed since the commit.
     """
     clone.check_unchanged()
     file = out / STUDY_FILE
     if not file.exists():
         make_folder(out)
-        write_json(file, {"schema": STUDY_SCHEMA, "commit": clone.commit})
+        commit = commit_elsewhere if clone.decides_runs_as(commit_elsewhere) else clone.commit
+        write_json(file, {"schema": STUDY_SCHEMA, "commit": commit})
     commit = commit_of_study(out)
     if changed := files_deciding_runs(clone.files_changed_since(commit)):
         raise MutatorError(

@@ -10,6 +10,7 @@ import pytest
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 from mutator.paper.reproduction import study_check, study_clone
+from mutator.paper.reproduction.page_rendering import StudyPages
 from mutator.paper.reproduction.study_campaigns import STUDY, StudyCampaign
 from mutator.paper.reproduction.study_check import DATA_SET_FOLDER, StudyCheck, changes_since_study
 from mutator.paper.reproduction.study_clone import (
@@ -31,6 +32,22 @@ from .made_up_study import CLONE, made_up_pages, made_up_rows, made_up_tables
 Check = Callable[..., list[str]]
 
 BLOCKS = "Text.\n\n<!-- study: summary -->\nobsolete\n<!-- end of study -->\n\nMore.\n"
+
+
+_FIGURE_BY_COUNTS: dict[str, bytes] = {}
+
+
+def drawn_once(study: StudyPages) -> bytes:
+    """Return the figure; the same counts are drawn only once in all tests."""
+    counts = study.fault_types_table("guided", "hazards", "activated")
+    if counts not in _FIGURE_BY_COUNTS:
+        _FIGURE_BY_COUNTS[counts] = draw_hazard_shares(study)
+    return _FIGURE_BY_COUNTS[counts]
+
+
+@pytest.fixture(autouse=True)
+def figures_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study_check, "draw_hazard_shares", drawn_once)
 
 
 def git(root: Path, *arguments: str) -> str:
@@ -55,7 +72,7 @@ def clone(tmp_path: Path) -> StudyClone:
     made_up_tables(commit).write(root / TABLES_FOLDER)
     (root / RESULTS_PAGE).write_text(study.results_page())
     (root / DIFFERENCES_PAGE).write_text(study.with_blocks(BLOCKS))
-    (root / FIGURE).write_bytes(draw_hazard_shares(study))
+    (root / FIGURE).write_bytes(drawn_once(study))
     return StudyClone(root=root, commit=commit)
 
 
@@ -162,6 +179,8 @@ def test_a_study_goes_on_while_no_file_that_decides_runs_has_changed(
     git(clone.root, "commit", "-q", "-a", "-m", "words")
     later = StudyClone(root=clone.root, commit=git(clone.root, "rev-parse", "HEAD"))
     assert open_study(out, later) == clone.commit
+    assert open_study(tmp_path / "on another machine", later, clone.commit) == clone.commit
+    assert open_study(tmp_path / "of an unknown commit", later, "ef" * 20) == later.commit
     (clone.root / "target" / "car.py").write_text("GAIN = 2\n")
     git(clone.root, "commit", "-q", "-a", "-m", "gain")
     with pytest.raises(MutatorError, match=r"a study of commit .*1 differ, such as target/car.py"):

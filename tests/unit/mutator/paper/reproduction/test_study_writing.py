@@ -18,14 +18,16 @@ from mutator.workspace import Workspace
 from .made_up_study import CLONE, COMMIT, made_up_rows, made_up_tables
 
 NAMES = [campaign.name for campaign in STUDY]
-Write = Callable[[Path, Sequence[str], str], list[str]]
+Write = Callable[..., list[str]]
 
 
 @pytest.fixture
 def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
-    """Write what a machine gives that has driven some campaigns in a folder of its own, at a commit."""
+    """Write what a machine gives that has driven some campaigns in a folder of its own, at a commit, and
+    computes the tables, perhaps at another one.
+    """
 
-    def write(folder: Path, driven: Sequence[str], commit: str) -> list[str]:
+    def write(folder: Path, driven: Sequence[str], commit: str, tables_commit: str = "") -> list[str]:
         def write_data_set(_folder: Path, _root: Path, *others: object) -> list[Row]:
             tables = others[-1]
             assert isinstance(tables, StudyTables)
@@ -34,12 +36,12 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
 
         monkeypatch.setattr(reproduce, "is_driven", lambda _, campaign: campaign.name in driven)
         monkeypatch.setattr(reproduce, "finished_folder", lambda *_: None)
-        monkeypatch.setattr(reproduce, "rows_of_campaign", lambda c, *_: made_up_rows(c, commit))
+        monkeypatch.setattr(reproduce, "rows_of_campaign", lambda c, _, __, *of: made_up_rows(c, *of))
         monkeypatch.setattr(reproduce, "write_data_set", write_data_set)
         page = tmp_path / "docs" / "explanation" / "differences-from-the-paper.md"
         page.parent.mkdir(parents=True, exist_ok=True)
         page.write_text("Text.\n")
-        clone = StudyClone(root=tmp_path, commit=commit)
+        clone = StudyClone(root=tmp_path, commit=tables_commit or commit)
         return reproduce.write_study(Workspace.find(CLONE), STUDY, folder, clone, commit, tmp_path)
 
     return write
@@ -59,9 +61,29 @@ def test_the_last_machine_writes_the_pages(write: Write, tmp_path: Path) -> None
 
 def test_rows_of_another_commit_are_not_kept(write: Write, tmp_path: Path) -> None:
     write(tmp_path / "a", NAMES[:1], COMMIT)
-    with pytest.warns(MutatorWarning, match=f"rows of {NAMES[0]} are left out"):
+    with pytest.warns(MutatorWarning, match=f"earlier rows of {NAMES[0]} are left out"):
         assert write(tmp_path / "b", NAMES[1:], "cd" * 20) == NAMES[:1]
     assert {row["commit"] for row in load_tables(tmp_path / TABLES_FOLDER).rows("runs")} == {"cd" * 20}
+
+
+@pytest.mark.parametrize("is_equal", [True, False])
+def test_rows_are_kept_where_the_same_files_decide_them(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_equal: bool
+) -> None:
+    """Then the tables stay of the commit at which the first of them were computed."""
+    monkeypatch.setattr(StudyClone, "decides_figures_as", lambda *_: is_equal)
+    write(tmp_path / "a", NAMES[:1], COMMIT)
+    if is_equal:
+        assert write(tmp_path / "b", NAMES[1:], COMMIT, "cd" * 20) == []
+        assert load_tables(tmp_path / TABLES_FOLDER).digest() == digest_of_one_machine(write, tmp_path)
+    else:
+        with pytest.warns(MutatorWarning, match="are left out"):
+            assert write(tmp_path / "b", NAMES[1:], COMMIT, "cd" * 20) == NAMES[:1]
+
+
+def digest_of_one_machine(write: Write, tmp_path: Path) -> str:
+    write(tmp_path / "c", NAMES, COMMIT)
+    return load_tables(tmp_path / TABLES_FOLDER).digest()
 
 
 @pytest.mark.parametrize("content", [None, "campaign\n"])
