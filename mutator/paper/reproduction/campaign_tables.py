@@ -11,7 +11,7 @@ from mutator.paper.fault_type_rank_agreement import GUIDED, measure_agreement
 from mutator.paper.observation_judging import JudgedObservation, combined_verdict, judge_observations
 from mutator.paper.observations_by_seed import judge_by_seed
 from mutator.paper.published_numbers import PublishedNumbers, load_published_numbers
-from mutator.paper.reproduction.explaining_counts import explaining_counts
+from mutator.paper.reproduction.explaining_counts import count_runs
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_tables import Row, tally_cells
 from mutator.paper.verdict_margins import describe_observation_margin, smallest_change
@@ -76,7 +76,7 @@ def rows_of_campaign(
         ],
         "explaining_counts": []
         if campaign.is_sample
-        else [{"campaign": name, "what": what, "count": count} for what, count in explaining_counts(frame)],
+        else [{"campaign": name, "what": what, "count": count} for what, count in count_runs(frame)],
         "agreement": [] if campaign.is_sample else list(_agreement_rows(name, frame, published)),
         "claims": list(_claim_rows(name, judged)),
         "observations": [

@@ -16,7 +16,7 @@ _PATH_MODEL = "vision_output/path_model"
 _LATE_S = 24.0  # if a fault begins later, less than 6 s of the run are left
 
 
-def explaining_counts(frame: "pd.DataFrame") -> Iterator[tuple[str, str]]:
+def count_runs(frame: "pd.DataFrame") -> Iterator[tuple[str, str]]:
     """Yield what is counted, and the count, from the frame of usable results. The faults are guided and
     activated, unless the words say otherwise.
     """

@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from mutator.paper.reproduction.explaining_counts import explaining_counts
+from mutator.paper.reproduction.explaining_counts import count_runs
 
 COLUMNS = (
     "kind",
@@ -47,7 +47,7 @@ def frame() -> pd.DataFrame:
 
 
 def test_each_count_is_of_its_runs(frame: pd.DataFrame) -> None:
-    counts = dict(explaining_counts(frame))
+    counts = dict(count_runs(frame))
     assert counts["speed, slower: hazards, and the first ones"] == "1 of 2 (H3 1)"
     assert counts["speed, faster: hazards, and the first ones"] == "0 of 0"
     assert counts["invisible vehicle in C4: hazards"] == "1 of 1"
@@ -65,4 +65,4 @@ def test_each_count_is_of_its_runs(frame: pd.DataFrame) -> None:
 
 def test_runs_without_any_activated_fault_have_counts(frame: pd.DataFrame) -> None:
     inactive = frame.assign(is_activated=False)
-    assert {count for _, count in explaining_counts(inactive)} == {"0 of 0", "-", "0"}
+    assert {count for _, count in count_runs(inactive)} == {"0 of 0", "-", "0"}
