@@ -79,7 +79,6 @@ def test_the_summary_says_by_rules_which_campaigns_are_near() -> None:
     assert "with its whole interval: as described; as coded" in text
 
 
-@pytest.mark.skipif(not TABLES.is_dir(), reason="no tables of the study yet")
 def test_what_the_page_says_of_alerts_is_what_its_table_shows() -> None:
     """On the reference plant, S2 and S4 have too many alerts, S3 and S5 too few, and the total is near the
     paper's. On the standard plant, each scenario has too few.
@@ -98,7 +97,6 @@ def test_what_the_page_says_of_alerts_is_what_its_table_shows() -> None:
         assert max(points_by_title[title]) < -NEAR_POINTS, title
 
 
-@pytest.mark.skipif(not TABLES.is_dir(), reason="no tables of the study yet")
 def test_what_the_page_says_of_counts_is_what_their_table_shows() -> None:
     """Each sentence that judges a count in *Alerts by scenario* and *What differs, and why*."""
     shares: dict[str, dict[str, float]] = {}
@@ -129,7 +127,6 @@ def test_what_the_page_says_of_counts_is_what_their_table_shows() -> None:
     assert times["coded"] < 0.5 * times["reference"]
 
 
-@pytest.mark.skipif(not TABLES.is_dir(), reason="no tables of the study yet")
 def test_one_claim_alone_decides_the_first_observation_as_described() -> None:
     claims = load_tables(TABLES).rows("claims", campaign="described", observation="1", needed="yes")
     assert {row["claim"]: row["claim_verdict"] for row in claims} == {

@@ -84,7 +84,6 @@ def problems(clone: StudyClone) -> list[str]:
     return list(check_of(clone.root).problems(None))
 
 
-@pytest.mark.skipif(not (CLONE / TABLES_FOLDER).is_dir(), reason="no tables of the study yet")
 def test_the_pages_of_this_clone_are_those_of_its_tables() -> None:
     """Both are in the repository, so that each edit of one of them is found here."""
     assert list(check_of(CLONE).problems(None)) == []
