@@ -99,13 +99,15 @@ def test_a_mark_of_the_map_opens_the_worst_experiment_of_its_scenario(page: "Pag
 
 
 def test_each_parameter_can_be_an_axis(page: "Page") -> None:
-    """Parameters with texts and the share of hazards can be chosen; the same points are a table."""
+    """Parameters with texts and the number of hazards, as the campaign is an even sample, can be chosen; the
+    same points are a table.
+    """
     page.page.select_option("#map-x", "road")
     page.page.select_option("#map-y", "hazards")
     page.page.click(".map-of-family summary")
     page.page.wait_for_selector(".map-of-family th")  # the browser opens the table after the click
     heads = page.texts(".map-of-family th")
-    assert heads[:2] == ["road", "experiments with a hazard [%]"]
+    assert heads[:2] == ["road", "experiments with a hazard"]
     rows = page.texts(".map-of-family tbody tr")
     assert f"{len(rows)} concrete scenarios" in page.page.inner_text("#family-plots")
 
