@@ -122,6 +122,8 @@ class StudyCheck:
             return
         with TemporaryDirectory() as temporary:
             again = write_data_set(Path(temporary), self.clone_root, self.campaigns, folders, tables)
+            for name in sorted({row["file"] for row in again} - {row["file"] for row in rows}):
+                yield f"{TABLES_FOLDER}/data_set.csv: no row of {name}"
             for name in (row["file"] for row in again):
                 if (folder / name).is_file() and not has_same_content(folder / name, Path(temporary, name)):
                     yield f"{folder / name}: not what the run folders give"

@@ -311,6 +311,16 @@ def test_a_data_set_edited_with_its_digest_is_found(
     assert check_with_runs() == [f"{folder / 'runs.csv'}: not what the run folders give"]
 
 
+def test_a_file_that_is_gone_with_its_row_is_found(
+    clone: StudyClone, check_with_runs: Check, tmp_path: Path
+) -> None:
+    folder, table = tmp_path / "study" / DATA_SET_FOLDER, clone.root / TABLES_FOLDER / "data_set.csv"
+    (folder / "runs.csv").unlink()
+    (folder / "SHA256SUMS").write_text("")
+    table.write_text(table.read_text().splitlines()[0] + "\n")
+    assert check_with_runs() == [f"{TABLES_FOLDER}/data_set.csv: no row of runs.csv"]
+
+
 def test_another_commit_in_the_tables_is_found(clone: StudyClone, check_with_runs: Check) -> None:
     """Also where each row has it: the study folder says at which commit its runs were driven."""
     runs = clone.root / TABLES_FOLDER / "runs.csv"
