@@ -9,14 +9,14 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.bounded_reading import read_bounded
+from mutator._common.bounded_reading import decompress_bounded, read_bounded
 from mutator._common.files import make_folder, remove_anything_at, write_atomic
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 from mutator.paper.reproduction.study_campaigns import StudyCampaign
 from mutator.paper.reproduction.study_tables import HEADS, Row, StudyTables
 from mutator.results.table_columns import result_columns_of
-from mutator.results.table_reader import Results
+from mutator.results.table_reader import Results, is_same_parquet
 from mutator.statistics.results_frame import load_usable_results
 from mutator.statistics.sample_weights import WEIGHT_COLUMN
 from mutator.statistics.statistics_sheet import Sheet
@@ -107,17 +107,19 @@ def differing_files(folder: Path, rows: Sequence[Row], may_be_missing: Collectio
     ]
 
 
-def has_same_content(path: Path, other: Path) -> bool:
-    """Return whether two files have the same content, whatever versions have compressed them."""
-    import pandas as pd
-
-    if path.suffix not in (".parquet", ".gz"):
-        return other.is_file() and read_bounded(path) == read_bounded(other)
+def has_same_content(path: Path, genuine: Path) -> bool:
+    """Return whether a file has the content of another one, however they are compressed."""
+    if not genuine.is_file():
+        return False
+    if path.suffix == ".parquet":
+        return is_same_parquet(path, genuine)
+    data, expected = read_bounded(path), read_bounded(genuine)
+    if path.suffix != ".gz" or data == expected:
+        return data == expected
+    text = gzip.decompress(expected)
     try:
-        if path.suffix == ".gz":
-            return gzip.decompress(read_bounded(path)) == gzip.decompress(read_bounded(other))
-        return pd.read_parquet(path).equals(pd.read_parquet(other))
-    except (OSError, EOFError, ValueError, zlib.error):
+        return decompress_bounded(data, len(text), gzip=True) == text
+    except (ValueError, zlib.error):
         return False
 
 

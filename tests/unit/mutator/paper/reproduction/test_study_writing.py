@@ -1,5 +1,6 @@
 """Machines share a study: each adds rows to the tables, and the last one writes the pages."""
 
+import gzip
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -131,3 +132,23 @@ def test_the_data_set_keeps_files_that_were_brought_from_another_machine(
     missing = [each for each in names if each != name]
     assert data_set.differing_files(second, again) == missing
     assert data_set.differing_files(second, again, may_be_missing=names) == []
+
+
+def test_the_same_content_may_be_compressed_otherwise(tmp_path: Path) -> None:
+    """A file that unpacks to more than the genuine one, and a damaged one, have another content."""
+    text, frame = b"campaign\n" * 100, pd.DataFrame({"campaign": ["coded", "described"]})
+    genuine, other = tmp_path / "genuine.csv.gz", tmp_path / "other.csv.gz"
+    genuine.write_bytes(gzip.compress(text, 9, mtime=0))
+    for data, is_same in (
+        (gzip.compress(text, 1, mtime=0), True),
+        (gzip.compress(text + b"coded\n"), False),
+        (gzip.compress(text.replace(b"a", b"b")), False),
+        (genuine.read_bytes()[:-4], False),
+        (b"no gzip", False),
+    ):
+        other.write_bytes(data)
+        assert data_set.has_same_content(other, genuine) is is_same
+    frame.to_parquet(tmp_path / "genuine.parquet", compression="zstd")
+    for cells, is_same in ((frame, True), (frame[::-1], False)):
+        cells.to_parquet(tmp_path / "other.parquet", compression="snappy")
+        assert data_set.has_same_content(tmp_path / "other.parquet", tmp_path / "genuine.parquet") is is_same
