@@ -4,8 +4,8 @@
 campaign, without camera frames, in five scenarios. The ways alternate, the campaign being the first and the
 last in turn, each in a process of its own, with checks that have passed before. CPU time covers the whole
 process tree. A bench proves more experiments than a campaign, whatever its batches; so each way is also
-compared with one batch of all experiments. It also prints how much memory the waiting processes of an open bench take, and the CPU time of
-a trial of another value beside its run.
+compared with one batch of all experiments. It also prints how much memory the waiting processes of an open
+bench take, and the CPU time of a trial of another value beside its run.
 """
 
 import argparse
