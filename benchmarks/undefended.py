@@ -34,10 +34,13 @@ def differing(here: dict[str, bytes], there: dict[str, bytes]) -> list[str]:
 
 
 def record_lines(run: Path, kind: str) -> dict[str, bytes]:
-    """Return the line of each record by experiment; the order of lines is that of arrival."""
+    """Return the line of each record by experiment, without its checksum, which covers the lines before it.
+
+    The order of lines is that of arrival.
+    """
     lines = [line for file in (run / kind).glob("*.jsonl") for line in file.read_bytes().splitlines()]
-    parsed = [(json.loads(line), line) for line in lines]
-    return {data["experiment_id"]: line for data, line in parsed if "experiment_id" in data}
+    parsed = [(json.loads(line), line.partition(b'",')[2]) for line in lines]
+    return {data["experiment_id"]: text for data, text in parsed if "experiment_id" in data}
 
 
 def golden_files(run: Path) -> dict[str, bytes]:
