@@ -18,13 +18,20 @@ _DECIDING_PATHS = (
     *("target/", "fault_library/", "templates/", "mutator/"),
     *("constraints.txt", "pyproject.toml", "setup.py"),
 )
-# doors and pages, which only show results
+# doors, checks and pages, and comparisons of finished runs: they only show results
 _SHOWING_PATHS = tuple(
     f"mutator/{name}/"
-    for name in ("cli", "api", "serve", "web", "reference", "onboarding", "exports", "report")
+    for name in (
+        *("cli", "api", "serve", "web", "reference", "onboarding", "exports", "report"),
+        *("checks", "comparison"),
+    )
 )
+# A campaign without defences, such as those of the study, executes nothing of it; a test drives one to see that.
+DEFENCES_PATH = "mutator/defences/"
 # what computes the study's tables from finished runs
 _STUDY_PATH = "mutator/paper/"
+# what says which files have changed, and the templates of the pages, which `--check` renders again
+_STUDY_CHECK_PATHS = ("mutator/paper/reproduction/study_clone.py", "mutator/paper/reproduction/pages/")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,8 +108,7 @@ def deciding_files(files: Iterable[str]) -> tuple[str, ...]:
         name
         for name in files
         if name.startswith(_DECIDING_PATHS)
-        and not name.startswith(_SHOWING_PATHS)
-        and not name.startswith("mutator/paper/reproduction/pages/")
+        and not name.startswith((*_SHOWING_PATHS, DEFENCES_PATH, *_STUDY_CHECK_PATHS))
     )
 
 

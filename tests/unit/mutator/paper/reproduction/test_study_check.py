@@ -19,8 +19,6 @@ from mutator.paper.reproduction.study_clone import (
     RESULTS_PAGE,
     TABLES_FOLDER,
     StudyClone,
-    deciding_files,
-    files_deciding_runs,
 )
 from mutator.paper.reproduction.study_driving import open_study
 from mutator.paper.reproduction.study_figure import draw_hazard_shares
@@ -154,18 +152,6 @@ def test_files_that_decide_tables_may_change_between_runs_and_tables(clone: Stud
     assert changes_since_study(clone.root, later)[1] == ()
     rules.write_text("LEAST = 2\n")
     assert changes_since_study(clone.root, later)[1] == ("mutator/paper/rules.py",)
-
-
-def test_doors_decide_no_figure() -> None:
-    files = (
-        "mutator/cli/app.py",
-        "mutator/model.py",
-        "docs/README.md",
-        "mutator/report/panel.py",
-        "setup.py",
-    )
-    assert deciding_files(files) == ("mutator/model.py", "setup.py")
-    assert files_deciding_runs(("mutator/paper/measures.py", *files)) == ("mutator/model.py", "setup.py")
 
 
 def test_a_study_goes_on_while_no_file_that_decides_runs_has_changed(
