@@ -29,6 +29,7 @@ from mutator.paper.reproduction.study_clone import (
     StudyClone,
     deciding_files,
     files_deciding_runs,
+    files_deciding_study,
 )
 from mutator.paper.reproduction.study_driving import commit_of_study, finished_folder
 from mutator.paper.reproduction.study_figure import draw_hazard_shares
@@ -163,7 +164,7 @@ def changes_since_study(docs_root: Path, clone: StudyClone) -> tuple[str, tuple[
         raise MutatorError("runs of different commits", where=docs_root / TABLES_FOLDER / "runs.csv")
     [(commit, tables_commit)] = pairs
     changed, changed_later = clone.files_changed_since(commit), clone.files_changed_since(tables_commit)
-    of_runs, of_tables = files_deciding_runs(changed), deciding_files(changed_later)
+    of_runs, of_tables = files_deciding_runs(changed), files_deciding_study(changed_later)
     sentences = (
         f"runs of {commit[:12]}: {counted(len(changed), 'file')} changed since, besides pages and tables; "
         f"{len(of_runs)} can decide a run{_named(of_runs)}",

@@ -18,20 +18,21 @@ _DECIDING_PATHS = (
     *("target/", "fault_library/", "templates/", "mutator/"),
     *("constraints.txt", "pyproject.toml", "setup.py"),
 )
-# doors, checks and pages, and comparisons of finished runs: they only show results
+# doors, checks and pages, which only show results
 _SHOWING_PATHS = tuple(
     f"mutator/{name}/"
-    for name in (
-        *("cli", "api", "serve", "web", "reference", "onboarding", "exports", "report"),
-        *("checks", "comparison"),
-    )
+    for name in ("cli", "api", "serve", "web", "reference", "onboarding", "exports", "report", "checks")
 )
-# A campaign without defences, such as those of the study, executes nothing of it; a test drives one to see that.
-DEFENCES_PATH = "mutator/defences/"
+# A campaign without defences, such as those of the study, executes nothing of these packages; a test drives
+# one to see that.
+UNUSED_BY_STUDY_PATHS = ("mutator/defences/", "mutator/comparison/")
 # what computes the study's tables from finished runs
 _STUDY_PATH = "mutator/paper/"
-# what says which files have changed, and the templates of the pages, which `--check` renders again
-_STUDY_CHECK_PATHS = ("mutator/paper/reproduction/study_clone.py", "mutator/paper/reproduction/pages/")
+# What compares the study with its pages, and the templates of the pages: tables come from neither, and
+# `--check` renders the pages again.
+_STUDY_CHECK_PATHS = tuple(
+    f"mutator/paper/reproduction/{name}" for name in ("study_check.py", "study_clone.py", "pages/")
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +75,7 @@ class StudyClone:
 
     def decides_figures_as(self, commit: str) -> bool:
         """Return whether no file that decides figures differs from that commit; false if it is not there."""
-        return self._has_commit(commit) and not deciding_files(self.files_changed_since(commit))
+        return self._has_commit(commit) and not files_deciding_study(self.files_changed_since(commit))
 
     def _has_commit(self, commit: str) -> bool:
         return _git_output(self.root, "cat-file", "-t", commit).startswith("commit")
@@ -98,17 +99,22 @@ class StudyClone:
 
 
 def files_deciding_runs(files: Iterable[str]) -> tuple[str, ...]:
-    """Return those of the files that can decide how an experiment ends."""
-    return tuple(name for name in deciding_files(files) if not name.startswith(_STUDY_PATH))
+    """Return those of the files that can decide how an experiment of the study ends."""
+    return tuple(name for name in files_deciding_study(files) if not name.startswith(_STUDY_PATH))
+
+
+def files_deciding_study(files: Iterable[str]) -> tuple[str, ...]:
+    """Return those of the files that can decide a figure of the study: a result, or what is computed from
+    results.
+    """
+    irrelevant = (*UNUSED_BY_STUDY_PATHS, *_STUDY_CHECK_PATHS)
+    return tuple(name for name in deciding_files(files) if not name.startswith(irrelevant))
 
 
 def deciding_files(files: Iterable[str]) -> tuple[str, ...]:
-    """Return those of the files that can decide a figure: a run's results, or what is computed from them."""
+    """Return those of the files that can decide a figure of any page."""
     return tuple(
-        name
-        for name in files
-        if name.startswith(_DECIDING_PATHS)
-        and not name.startswith((*_SHOWING_PATHS, DEFENCES_PATH, *_STUDY_CHECK_PATHS))
+        name for name in files if name.startswith(_DECIDING_PATHS) and not name.startswith(_SHOWING_PATHS)
     )
 
 

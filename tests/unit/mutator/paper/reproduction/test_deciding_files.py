@@ -10,24 +10,36 @@ import pytest
 
 import mutator
 from mutator.execution.campaign_running import run_campaign
-from mutator.paper.reproduction.study_clone import DEFENCES_PATH, deciding_files, files_deciding_runs
+from mutator.paper.reproduction.study_clone import (
+    UNUSED_BY_STUDY_PATHS,
+    deciding_files,
+    files_deciding_runs,
+    files_deciding_study,
+)
 from mutator.workspace import Workspace
 
 PACKAGE = Path(mutator.__file__).parent
 
 
-def test_doors_comparisons_and_defences_decide_no_figure() -> None:
-    files = (
-        "mutator/cli/app.py",
-        "mutator/comparison/defended_pairs.py",
-        "mutator/defences/defence_yaml.py",
-        "mutator/model.py",
-        "docs/README.md",
-        "mutator/report/panel.py",
-        "setup.py",
-    )
-    assert deciding_files(files) == ("mutator/model.py", "setup.py")
-    assert files_deciding_runs(("mutator/paper/measures.py", *files)) == ("mutator/model.py", "setup.py")
+FILES = (
+    "mutator/cli/app.py",
+    "mutator/comparison/defended_pairs.py",
+    "mutator/defences/defence_yaml.py",
+    "mutator/model.py",
+    "mutator/paper/measures.py",
+    "mutator/paper/reproduction/study_check.py",
+    "docs/README.md",
+    "mutator/report/panel.py",
+    "setup.py",
+)
+
+
+def test_a_figure_of_the_study_is_decided_by_fewer_files() -> None:
+    """Defences and comparisons decide figures of other pages alone; doors decide none."""
+    assert files_deciding_runs(FILES) == ("mutator/model.py", "setup.py")
+    assert files_deciding_study(FILES) == ("mutator/model.py", "mutator/paper/measures.py", "setup.py")
+    others = {"mutator/cli/app.py", "docs/README.md", "mutator/report/panel.py"}
+    assert set(deciding_files(FILES)) == set(FILES) - others
 
 
 def executed_modules(call: Callable[[], object]) -> set[str]:
@@ -57,6 +69,5 @@ def test_only_a_campaign_with_defences_executes_what_reads_them(
     workspace = copy_toycar(tmp_path)
     executed = executed_modules(lambda: run_campaign(workspace, campaign, tmp_path / "run"))
     assert "mutator/campaigns/plan.py" in executed
-    assert not [name for name in executed if name.startswith(("mutator/checks/", "mutator/comparison/"))]
-    of_defences = [name for name in executed if name.startswith(DEFENCES_PATH)]
-    assert bool(of_defences) == (campaign == "defended"), of_defences
+    unused = [name for name in executed if name.startswith(UNUSED_BY_STUDY_PATHS)]
+    assert bool(unused) == (campaign == "defended"), unused
