@@ -12,15 +12,12 @@ from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import checked_path_inside
 from mutator._common.message_text import describe_choices, spelling_suggestion
 from mutator.config.yaml_source_lines import YamlSource
+from mutator.defences.model_reads import Reads, commands_of, reads_of
+from mutator.defences.model_uses import check_uses, model_error
 from mutator.errors import MutatorError
 
 MODELS_FOLDER = "defences"
 _MOST_MODEL_BYTES = 100_000
-# a defence has no clock, file, process or shared random state
-_ALLOWED_IMPORTS = frozenset(
-    ("bisect", "cmath", "collections", "dataclasses", "enum", "fractions", "functools", "heapq", "itertools")
-) | frozenset(("math", "numbers", "operator", "statistics", "typing"))
-_REFUSED_NAMES = frozenset(("__import__", "compile", "eval", "exec", "globals", "input", "open", "print"))
 _NO_ARGUMENTS = ast.arguments(
     posonlyargs=[], args=[ast.arg("self")], kwonlyargs=[], kw_defaults=[], defaults=[]
 )
@@ -31,7 +28,9 @@ _METHODS = {"reset": ("self",), "update": ("self", "since_s", "sensed", "applied
 class DefenceModelFile:
     """A model's file: the numbers that it takes, those that it needs, and whether it takes others, too.
 
-    The names of those others are `<word>_<command>`, with a word of `bounds`; None: any word.
+    The names of those others are `<word>_<command>`, with a word of `bounds`; None: any word. `sensed` and
+    `applied` say what the model reads from these arguments, and `commands` for which commands it always
+    gives ranges, as far as its source says so.
     """
 
     path: Path
@@ -40,6 +39,9 @@ class DefenceModelFile:
     required_parameters: tuple[str, ...]
     takes_any: bool
     bounds: tuple[str, ...] | None
+    sensed: Reads
+    applied: Reads
+    commands: tuple[str, ...]
 
     def choose_parameters(
         self, names: Sequence[str], commands: Collection[str], source: YamlSource
@@ -71,8 +73,8 @@ class DefenceModelFile:
 
 
 def load_defence_model(templates: Path, name: str, source: YamlSource) -> DefenceModelFile:
-    """Read and check the model that a defence names. MutatorError for an unknown name, for a file that is no
-    model, and for imports other than a few of the standard library.
+    """Read and check the model that a defence names. MutatorError for an unknown name, for a file that cannot
+    be read or is no model, and as in `check_uses`.
     """
     folder = templates / MODELS_FOLDER
     names = sorted(path.stem for path in folder.glob("*.py"))
@@ -84,7 +86,7 @@ def load_defence_model(templates: Path, name: str, source: YamlSource) -> Defenc
             remedy="correct the name" + spelling_suggestion(name, names),
         )
     path = checked_path_inside(templates, folder / f"{name}.py")
-    code = read_bounded(path, _MOST_MODEL_BYTES)
+    code = _read_model(path, source)
     try:
         tree = ast.parse(code)
         compile(code, str(path), "exec", dont_inherit=True)
@@ -95,20 +97,39 @@ def load_defence_model(templates: Path, name: str, source: YamlSource) -> Defenc
             line=error.lineno if isinstance(error, SyntaxError) else None,
             remedy="correct the model",
         ) from None
-    _check_uses(tree, path)
-    arguments = _init_arguments(tree, path)
+    check_uses(tree, path)
+    methods = _methods(tree, path)
+    arguments = methods["__init__"].args if "__init__" in methods else _NO_ARGUMENTS
+    required = [
+        argument.arg
+        for argument, default in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)
+        if default is None
+    ]
+    if arguments.kwarg:
+        required += dict(reads_of(methods["__init__"], arguments.kwarg.arg).line_by_required_name)
     return DefenceModelFile(
         path=path,
         code=code,
         parameters=tuple(argument.arg for argument in arguments.kwonlyargs),
-        required_parameters=tuple(
-            argument.arg
-            for argument, default in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True)
-            if default is None
-        ),
+        required_parameters=tuple(required),
         takes_any=arguments.kwarg is not None,
         bounds=_bounds(tree, path),
+        sensed=reads_of(methods["update"], "sensed"),
+        applied=reads_of(methods["update"], "applied"),
+        commands=commands_of(methods["update"]),
     )
+
+
+def _read_model(path: Path, source: YamlSource) -> bytes:
+    try:
+        return read_bounded(path, _MOST_MODEL_BYTES)
+    except OSError as error:
+        raise source.error(
+            ("model",),
+            f"{path} cannot be read ({error.strerror})",
+            expected="a file, the source of a model",
+            remedy="put a file in its place, or name another model",
+        ) from None
 
 
 def _bounds(tree: ast.Module, path: Path) -> tuple[str, ...] | None:
@@ -125,52 +146,25 @@ def _bounds(tree: ast.Module, path: Path) -> tuple[str, ...] | None:
                 if names and len(names) == len(items):
                     return names
                 expected = 'first words of parameters, e.g. ("lowest", "highest")'
-                raise _model_error(f"BOUNDS = {ast.unparse(value)}", path, node.lineno, expected)
+                raise model_error(f"BOUNDS = {ast.unparse(value)}", path, node.lineno, expected)
     return None
 
 
-def _check_uses(tree: ast.Module, path: Path) -> None:
-    for node in ast.walk(tree):
-        match node:
-            case ast.Import(names=aliases):
-                imports = [alias.name for alias in aliases]
-            case ast.ImportFrom(module=module, level=level):
-                imports = ["." * level + (module or "")]
-            case ast.Name(id=name) if name in _REFUSED_NAMES:
-                raise _model_error(f"the name `{name}`", path, node.lineno, "neither files nor other code")
-            case _:
-                continue
-        for name in imports:
-            if name.split(".")[0] not in _ALLOWED_IMPORTS:
-                expected = f"imports of {', '.join(sorted(_ALLOWED_IMPORTS))}"
-                raise _model_error(f"an import of {name}", path, node.lineno, expected)
-
-
-def _init_arguments(tree: ast.Module, path: Path) -> ast.arguments:
-    """Check the class `Model`, and return the arguments of its `__init__`."""
+def _methods(tree: ast.Module, path: Path) -> dict[str, ast.FunctionDef]:
+    """Check the class `Model`, and return its methods by name."""
     classes = [node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == "Model"]
     if len(classes) != 1:
-        raise _model_error(f"{len(classes)} classes `Model`", path, None, "one")
-    methods = {node.name: node.args for node in classes[0].body if isinstance(node, ast.FunctionDef)}
+        raise model_error(f"{len(classes)} classes `Model`", path, 1, "one")
+    line = classes[0].lineno
+    methods = {node.name: node for node in classes[0].body if isinstance(node, ast.FunctionDef)}
     for name, expected in _METHODS.items():
-        arguments = methods.get(name)
-        if arguments is None or tuple(argument.arg for argument in arguments.args) != expected:
-            raise _model_error(
-                f"no method `{name}({', '.join(expected)})`",
-                path,
-                classes[0].lineno,
-                "it, with these arguments",
-            )
-    initial = methods.get("__init__") or _NO_ARGUMENTS
-    if len(initial.args) != 1 or initial.posonlyargs or initial.vararg:
-        raise _model_error(
-            "arguments by position in `Model.__init__`",
-            path,
-            classes[0].lineno,
-            "`self, *`, then its numbers",
-        )
-    return initial
-
-
-def _model_error(problem: str, path: Path, line: int | None, expected: str) -> MutatorError:
-    return MutatorError(problem, where=path, line=line, expected=expected, remedy="correct the model")
+        method = methods.get(name)
+        if method is None or tuple(argument.arg for argument in method.args.args) != expected:
+            problem = f"no method `{name}({', '.join(expected)})`"
+            raise model_error(problem, path, line, "it, with these arguments")
+    if "__init__" in methods:
+        initial = methods["__init__"].args
+        if len(initial.args) != 1 or initial.posonlyargs or initial.vararg:
+            problem = "arguments by position in `Model.__init__`"
+            raise model_error(problem, path, line, "`self, *`, then its numbers")
+    return methods
