@@ -5,7 +5,9 @@ from enum import StrEnum
 from pathlib import Path
 
 from mutator.config.yaml_source_lines import YamlSource
+from mutator.defences.defence_models import DefenceModelFile
 from mutator.targets.observed_values import ObservedValue
+from mutator.triggers.conditions import names_in
 
 
 class Role(StrEnum):
@@ -66,6 +68,7 @@ class Defence:
     model: str
     model_path: Path
     model_code: bytes = field(repr=False)
+    model_file: DefenceModelFile = field(repr=False, compare=False)
     senses: tuple[Sense, ...]
     derived: tuple[ObservedValue, ...]
     parameters: tuple[Parameter, ...]
@@ -78,3 +81,9 @@ class Defence:
     priority: float
     digest: str  # of its file and its model
     source: YamlSource = field(repr=False, compare=False)
+
+    @property
+    def names_in_formulas(self) -> frozenset[str]:
+        """The names that conditions and formulas use."""
+        texts = (self.acts_when, self.lets_go_when, *(value.text for value in self.derived))
+        return frozenset(name for text in texts for name in names_in(text))

@@ -79,7 +79,7 @@ def test_run_begins_with_hazards_that_defences_cause_without_a_fault(
     defence = root / "fault_library" / "defences" / "emergency_brake.yaml"
     text = defence.read_text().replace("lowest_brake: {value: 1.0", "lowest_gas: {value: 1.0")
     text = text.replace("highest_gas: {value: 0,", "highest_brake: {value: 0,")
-    text = text.replace("ttc < limit", "gap > limit").replace("closing <= 0", "gap > 10000")
+    text = text.replace("ttc < limit", "ttc > -limit").replace("closing <= 0", "gap > 10000")
     defence.write_text(text)
     campaign = root / "fault_library" / "campaigns" / "defended.yaml"
     text = campaign.read_text()

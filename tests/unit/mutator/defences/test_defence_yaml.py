@@ -66,13 +66,46 @@ def test_the_digest_covers_file_and_model(toycar: Workspace) -> None:
         ("lowest_brake:", "highest_brake: {value: 0.4, unit: '-'}, lowest_brake:", CROSSING),
         ("offset: {value", "gap: {value", "'gap'; expected a unique name"),
         ("commands: [brake]", "commands: [brake, horn]", "'horn'; expected one of gas, brake, wheel_turn"),
-        ("commands: [brake]", "commands: []", "commands"),
+        ("commands: [brake]", "commands: []", r"\[\] for 'commands'; expected at least one command"),
+        ("commands: [brake]", "commands: [brake, brake]", "each command once, but 'brake' is there twice"),
+        ("commands: [brake]", "commands: [brak]", "'brak'; expected one of gas, brake, wheel_turn"),
+        ("commands: [brake]", "commands: [brake, gas]", "nothing changes 'gas'; expected .*lowest_gas or"),
         ("value: 0.5", "value: .nan", "nan"),
+        ("value: 0.5", "value: true", "true for 'value'; expected a number"),
+        ("value: 0.5", "value: '0.5'", "'0.5' for 'value'; expected a number"),
+        ("role:", "priority: '1'\nrole:", "'1' for 'priority'; expected a number"),
+        ("senses: {", "senses: {more: {truth: rs}, ", "nothing uses 'more'; expected a value of"),
+        ("derived: {", "derived: {more: {is: gap, unit: m, about: more}, ", "nothing uses 'more'"),
+        ("acts_when: abs(error) > 2", "acts_when: ''", "an empty text; expected a condition"),
+        ("commands:", "lets_go_when: ' '\ncommands:", "an empty text; expected a condition; write one"),
     ],
 )
 def test_a_mistake_in_the_file_is_refused(toycar: Workspace, old: str, new: str, message: str) -> None:
     with pytest.raises(MutatorError, match=r"d\.yaml:\d+: .*" + message.replace("(", r"\(")):
         load(toycar, FILE.replace(old, new))
+
+
+def test_a_defence_that_never_acts_is_refused(toycar: Workspace) -> None:
+    text = FILE.replace("abs(error) > 2", "'False'").replace("lets_go", "# lets_go")
+    text = text.replace("senses:", "# senses:").replace("derived:", "# derived:").replace("offset: ", "# ")
+    text = text.replace("parameters: {# {value: 1, unit: m}, ", "parameters: {")
+    with pytest.raises(MutatorError, match=r"d\.yaml:\d+: 'False', which never holds"):
+        load(toycar, text)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("x-2", "'x-2'; expected a name of the letters a to z and A to Z, digits and _"),
+        ("none", "'none'; expected another name: in a campaign, `none` is the run without defences"),
+        ("n" * 214, r"expected at most 213 characters.*; shorten the name, and that of the file"),
+    ],
+)
+def test_a_name_that_cannot_be_used_is_refused(toycar: Workspace, name: str, message: str) -> None:
+    path = toycar.library / "defences" / f"{name}.yaml"
+    path.write_text(FILE.replace("name: d", f"name: {name}"))
+    with pytest.raises(MutatorError, match=rf"{name}\.yaml:2: .*{message}"):
+        toycar.defence(name)
 
 
 def test_a_negative_rate_is_refused(toycar: Workspace) -> None:
@@ -101,41 +134,6 @@ def test_a_model_without_bounds_takes_any_word(toycar: Workspace) -> None:
     (toycar.templates / "defences" / "own.py").write_text(code)
     load(toycar, FILE.replace("constant_command", "own").replace("lowest_brake", "peak_brake"))
     assert toycar.defence("d").model_parameters == ("peak_brake",)
-
-
-@pytest.mark.parametrize(
-    ("code", "message"),
-    [
-        ("class Model:\n    def reset(self): ...\n", r"no method `update\(self, since_s, sensed, applied\)`"),
-        ("import os\n", "an import of os"),
-        ("from . import x\n", "an import of ."),
-        ("x = open('a')\n", "the name `open`"),
-        ("x = 1\n", "0 classes `Model`"),
-        ("x = (\n", "not valid Python"),
-        (
-            "BOUNDS = [1]\nclass Model:\n    def reset(self): ...\n"
-            "    def update(self, since_s, sensed, applied): ...\n",
-            r"BOUNDS = \[1\]; expected first words",
-        ),
-        (
-            "BOUNDS: list[int] = [1]\nclass Model:\n    def reset(self): ...\n"
-            "    def update(self, since_s, sensed, applied): ...\n",
-            r"BOUNDS = \[1\]; expected first words",
-        ),
-    ],
-)
-def test_a_file_that_is_no_model_is_refused(toycar: Workspace, code: str, message: str) -> None:
-    (toycar.templates / "defences" / "own.py").write_text(code)
-    with pytest.raises(MutatorError, match=rf"own\.py.*{message}"):
-        load(toycar, FILE.replace("constant_command", "own"))
-
-
-def test_a_missing_parameter_of_the_model_is_named(toycar: Workspace) -> None:
-    code = "class Model:\n    def __init__(self, *, amount, more=1.0): ...\n    def reset(self): ...\n"
-    code += "    def update(self, since_s, sensed, applied): ...\n"
-    (toycar.templates / "defences" / "own.py").write_text(code)
-    with pytest.raises(MutatorError, match=r"no parameter 'amount'; expected .* amount, more"):
-        load(toycar, FILE.replace("constant_command", "own"))
 
 
 def test_a_target_without_actuation_cannot_be_defended(toycar: Workspace) -> None:

@@ -20,7 +20,7 @@ role: safety_mechanism
 kind: other
 model: {model}
 {body}
-commands: [gas, brake]
+commands: {commands}
 """
 MODEL = """\
 class Model:
@@ -47,7 +47,8 @@ def runtime(toycar: Workspace, bodies: dict[str, str], model: str = "constant_co
     """Return the runtime `_fd` of a toy with defences of these names and bodies of their files."""
     folder = toycar.library / "defences"
     for name, body in bodies.items():
-        text = FILE.format(name=name, model=model, body=body)
+        commands = "[gas, brake]" if model == "own" else "[brake]"
+        text = FILE.format(name=name, model=model, body=body, commands=commands)
         (folder / f"{name}.yaml").write_text(text)
     tree = toycar.defended(toycar.manifest("toycar"), bodies).tree
     package = sys.modules["toycar"] = types.ModuleType("toycar")
@@ -151,7 +152,9 @@ def test_the_highest_priority_decides_and_disjoint_ranges_conflict(toycar: Works
 
 
 def test_a_finite_range_is_clipped_to_the_limits_of_the_command(toycar: Workspace) -> None:
-    fd = runtime(toycar, {"d": f"{BRAKES.replace('0.5', '7.0')}acts_when: gap < 10"})
+    """A file cannot have such a bound, but its model can give one."""
+    write_model(toycar, "return {'brake': (7.0, float('inf'))}")
+    fd = runtime(toycar, {"d": "parameters: {amount: {value: 1, unit: '-'}}"}, model="own")
     assert drive(fd, [9]) == [1.0]
 
 
@@ -188,7 +191,7 @@ def test_a_new_run_starts_with_new_states(toycar: Workspace) -> None:
 @pytest.mark.parametrize(
     ("update", "message"),
     [
-        ("return {'wheel_turn': (0.0, 0.0)}", "commands wheel_turn, which it may not"),
+        ("return {'wheel' + '_turn': (0.0, 0.0)}", "commands wheel_turn, which it may not"),
         ("return {'brake': (1.0, 0.0)}", "gives brake the range 1.0 to 0.0"),
         ("return {'brake': (float('nan'), 0.0)}", "gives brake the range nan to 0.0"),
     ],
@@ -202,7 +205,7 @@ def test_a_model_that_gives_something_else_fails(toycar: Workspace, update: str,
 
 def test_without_an_observation_commands_are_unchanged(toycar: Workspace) -> None:
     """A target can command before it is first observed."""
-    fd = runtime(toycar, {"d": BRAKES})
+    fd = runtime(toycar, {"d": f"{BRAKES}acts_when: gap < 10"})
     assert fd.command(gas=0.0, brake=0.1, wheel_turn=0.0) == (0.0, 0.1, 0.0)
     assert drive(fd, [9]) == [0.5]
 
