@@ -9,6 +9,8 @@ from mutator.campaigns.campaign_files import Campaign, check_readings, load_camp
 from mutator.campaigns.campaign_triggers import build_listed_triggers
 from mutator.campaigns.installed_studies import study_problems
 from mutator.config.yaml_source_lines import KeyPath
+from mutator.defences.defence_yaml import check_file_names
+from mutator.defences.parameter_checks import check_parameters
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModelExample, FaultModels
 from mutator.faults.fault_specs import FaultSpec, Variant
@@ -41,6 +43,7 @@ def library_problems(workspace: Workspace, target: str) -> list[MutatorError]:
     * Every spec must expand in every reading, and every anchor must match the target exactly once.
     * In every reading, one mutant of each variant must compile and un-splice.
     * Campaigns must load, and their studies must find valid data.
+    * Defences must load with their models, and fit the targets of the campaigns that name them.
     * A hazard analysis, if any, must have no gap.
     """
     collector = _ProblemCollector()
@@ -70,6 +73,7 @@ def library_problems(workspace: Workspace, target: str) -> list[MutatorError]:
         collector.result_of(partial(workspace.family, name))
     if readings:
         collector.problems += campaign_problems(workspace, readings, manifest)
+    collector.problems += defence_problems(workspace, manifest)
     # the analysis compares specs with context tables, so it needs all of them to be valid
     if not collector.problems:
         specs_in_order = collector.result_of(workspace.specs)
@@ -100,6 +104,53 @@ def campaign_problems(
             problems = study_problems(campaign.study, study, workspace)
             collector.problems += [_problem_at_campaign(problem, campaign) for problem in problems]
     return collector.problems
+
+
+def defence_problems(workspace: Workspace, manifest: TargetManifest | None = None) -> list[MutatorError]:
+    """Problems of the library's defences, and of the sets that its campaigns name: each is put into the tree
+    of the campaign's target, as a plan does. `manifest` is one that is loaded already.
+
+    A campaign or another target that cannot be loaded is skipped; its own check has that problem.
+    """
+    collector = _ProblemCollector()
+    collector.result_of(lambda: check_file_names(workspace.library))
+    path_by_name = None if collector.problems else collector.result_of(lambda: workspace.defences)
+    if path_by_name is None:
+        return collector.problems
+    defences = {name: collector.result_of(partial(workspace.defence, name)) for name in path_by_name}
+    broken_names = {name for name, defence in defences.items() if defence is None}
+    fitted_names = set[str]()
+    for campaign in filter(
+        None, (_result_or_none(partial(load_campaign, path)) for path in workspace.campaigns.values())
+    ):
+        names_in_sets = {name for names in campaign.defence_sets for name in names}
+        target = manifest if manifest and manifest.name == campaign.target else None
+        if names_in_sets and target is None:
+            target = _result_or_none(partial(workspace.manifest, campaign.target))
+        if target is None:
+            continue
+        fitted_names |= names_in_sets
+        for i, names in enumerate(campaign.defence_sets):
+            if broken_names.isdisjoint(names):
+                collector.result_of(partial(_check_defence_set, workspace, campaign, i, target))
+    for name, defence in defences.items():
+        # what no target's commands contradict
+        if defence and name not in fitted_names:
+            collector.result_of(partial(check_parameters, defence))
+    return list({str(problem): problem for problem in collector.problems}.values())
+
+
+def _check_defence_set(workspace: Workspace, campaign: Campaign, index: int, target: TargetManifest) -> None:
+    with campaign.locating_errors(("defences", index)):
+        workspace.defended(target, campaign.defence_sets[index])
+
+
+def _result_or_none(make: Callable[[], Result]) -> Result | None:
+    """Return the result of `make`; None if that fails, which another check says."""
+    try:
+        return make()
+    except MutatorError:
+        return None
 
 
 def _check_listed_triggers(campaign: Campaign, manifest: TargetManifest) -> None:
