@@ -30,6 +30,7 @@ class EntryKind(StrEnum):
     CAMPAIGNS = "campaigns"
     MODELS = "models"
     TRIGGERS = "triggers"
+    DEFENCES = "defences"
     TARGETS = "targets"
 
 
@@ -61,7 +62,7 @@ def list_library(
     *,
     workspace_options: WorkspaceOptions,
 ) -> None:
-    """List specs, scenarios, families, campaigns, models, triggers, targets."""
+    """List specs, scenarios, families, campaigns, models, triggers, defences, targets."""
     terminal = Terminal(as_json, wide)
     workspace = workspace_options.workspace()
     tables = {k.value: LIST_BY_KIND[k](workspace) for k in ([kind] if kind else list(EntryKind))}
@@ -144,6 +145,23 @@ def _list_triggers(workspace: "Workspace") -> ColumnsAndRows:
     return ["table", "name", "condition", "about"], rows
 
 
+def _list_defences(workspace: "Workspace") -> ColumnsAndRows:
+    from mutator.defences.defence_yaml import check_file_names
+
+    check_file_names(workspace.library)
+    rows = [
+        {
+            "name": defence.name,
+            "role": defence.role.value,
+            "kind": defence.kind.value,
+            "model": defence.model,
+            "about": _as_one_line(defence.about),
+        }
+        for defence in map(workspace.defence, workspace.defences)
+    ]
+    return ["name", "role", "kind", "model", "about"], rows
+
+
 def _list_targets(workspace: "Workspace") -> ColumnsAndRows:
     rows = []
     for name in workspace.targets:
@@ -160,6 +178,7 @@ LIST_BY_KIND: dict[EntryKind, Callable[["Workspace"], ColumnsAndRows]] = {
     EntryKind.CAMPAIGNS: _list_campaigns,
     EntryKind.MODELS: _list_fault_models,
     EntryKind.TRIGGERS: _list_triggers,
+    EntryKind.DEFENCES: _list_defences,
     EntryKind.TARGETS: _list_targets,
 }
 

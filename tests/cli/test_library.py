@@ -20,7 +20,7 @@ def test_list_shows_every_kind(cli: Cli, root: Path) -> None:
 
 def test_list_as_json_is_one_document(cli: Cli, root: Path) -> None:
     listed = cli("list", "--json").json
-    kinds = {"specs", "scenarios", "families", "campaigns", "models", "triggers", "targets"}
+    kinds = {"specs", "scenarios", "families", "campaigns", "models", "triggers", "defences", "targets"}
     assert set(listed) == kinds
     assert [(s["name"], s["faults"]) for s in listed["specs"]] == [
         ("sensor/distance", 6),
