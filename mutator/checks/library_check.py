@@ -1,6 +1,7 @@
 """Check that everything in the library is usable, for `mutator check`."""
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -109,8 +110,6 @@ def campaign_problems(
 def defence_problems(workspace: Workspace, manifest: TargetManifest | None = None) -> list[MutatorError]:
     """Problems of the library's defences, and of the sets that its campaigns name: each is put into the tree
     of the campaign's target, as a plan does. `manifest` is one that is loaded already.
-
-    A campaign or another target that cannot be loaded is skipped; its own check has that problem.
     """
     collector = _ProblemCollector()
     collector.result_of(lambda: check_file_names(workspace.library))
@@ -120,37 +119,43 @@ def defence_problems(workspace: Workspace, manifest: TargetManifest | None = Non
     defences = {name: collector.result_of(partial(workspace.defence, name)) for name in path_by_name}
     broken_names = {name for name, defence in defences.items() if defence is None}
     fitted_names = set[str]()
-    for campaign in filter(
-        None, (_result_or_none(partial(load_campaign, path)) for path in workspace.campaigns.values())
-    ):
-        names_in_sets = {name for names in campaign.defence_sets for name in names}
-        target = manifest if manifest and manifest.name == campaign.target else None
-        if names_in_sets and target is None:
-            target = _result_or_none(partial(workspace.manifest, campaign.target))
-        if target is None:
-            continue
-        fitted_names |= names_in_sets
+    for campaign, target in _defended_campaigns(workspace, manifest):
+        fitted_names.update(*campaign.defence_sets)
         for i, names in enumerate(campaign.defence_sets):
             if broken_names.isdisjoint(names):
                 collector.result_of(partial(_check_defence_set, workspace, campaign, i, target))
     for name, defence in defences.items():
-        # what no target's commands contradict
+        # if a campaign names it, a misspelt command is the better explanation of an unused parameter
         if defence and name not in fitted_names:
             collector.result_of(partial(check_parameters, defence))
+    # several sets can have the same defence
     return list({str(problem): problem for problem in collector.problems}.values())
+
+
+def _defended_campaigns(
+    workspace: Workspace, manifest: TargetManifest | None
+) -> Iterator[tuple[Campaign, TargetManifest]]:
+    """Yield the campaigns with defences, and their targets.
+
+    What cannot be loaded is left out, because another check has that problem. So are other targets than
+    `manifest` if the workspace names the folder of one.
+    """
+    manifest_by_name = {manifest.name: manifest} if manifest else {}
+    for path in workspace.campaigns.values():
+        with suppress(MutatorError):
+            campaign = load_campaign(path)
+            if not campaign.defence_sets:
+                continue
+            name = campaign.target
+            if name not in manifest_by_name and (workspace.target is None or manifest is None):
+                manifest_by_name[name] = workspace.manifest(name)
+            if name in manifest_by_name:
+                yield campaign, manifest_by_name[name]
 
 
 def _check_defence_set(workspace: Workspace, campaign: Campaign, index: int, target: TargetManifest) -> None:
     with campaign.locating_errors(("defences", index)):
         workspace.defended(target, campaign.defence_sets[index])
-
-
-def _result_or_none(make: Callable[[], Result]) -> Result | None:
-    """Return the result of `make`; None if that fails, which another check says."""
-    try:
-        return make()
-    except MutatorError:
-        return None
 
 
 def _check_listed_triggers(campaign: Campaign, manifest: TargetManifest) -> None:

@@ -146,9 +146,6 @@ def _list_triggers(workspace: "Workspace") -> ColumnsAndRows:
 
 
 def _list_defences(workspace: "Workspace") -> ColumnsAndRows:
-    from mutator.defences.defence_yaml import check_file_names
-
-    check_file_names(workspace.library)
     rows = [
         {
             "name": defence.name,

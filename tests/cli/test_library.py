@@ -31,6 +31,14 @@ def test_list_as_json_is_one_document(cli: Cli, root: Path) -> None:
     assert all(one["about"] for one in listed["campaigns"])
 
 
+def test_list_shows_defences(cli: Cli, root: Path) -> None:
+    [brake, limit] = cli("list", "defences", "--json").json["defences"]
+    assert [*brake] == ["name", "role", "kind", "model", "about"]
+    assert limit["name"] == "pedal_limit"
+    assert limit["role"] == "external_measure"
+    assert "defences (2)" in cli("list").out
+
+
 def test_an_unknown_kind_lists_the_known_ones(cli: Cli, root: Path) -> None:
     answer = cli("list", "nothing")
     assert answer.code == 2

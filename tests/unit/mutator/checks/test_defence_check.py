@@ -1,5 +1,7 @@
 """The check of a library loads its defences, and fits them to the targets of the campaigns that name them."""
 
+from dataclasses import replace
+
 import pytest
 
 from mutator.checks.library_check import defence_problems, library_problems
@@ -51,6 +53,19 @@ def test_a_defence_that_no_campaign_names_is_checked_alone(toycar: Workspace) ->
     (toycar.library / "defences" / "other.yaml").write_text(text.replace("[gas, brake]", "[gas]"))
     (problem,) = texts(toycar)
     assert "nothing uses 'lowest_brake'" in problem
+
+
+def test_a_set_is_fitted_to_the_target_of_its_campaign(toycar: Workspace) -> None:
+    """Another target is skipped if the workspace names the folder of one, which need not be its folder."""
+    path = toycar.library / "targets" / "toycar.yaml"
+    text = path.read_text().replace("name: toycar", "name: other").replace("is: brake,", "is: gas,")
+    path.with_stem("other").write_text(text)
+    manifest = toycar.manifest("toycar")
+    assert defence_problems(toycar, manifest) == []
+    change(toycar, "campaigns/defended.yaml", "target: toycar", "target: other")
+    (problem,) = defence_problems(toycar, manifest)
+    assert "other.yaml" in str(problem)
+    assert defence_problems(replace(toycar, target=manifest.root), manifest) == []
 
 
 def test_a_name_that_is_too_long_is_said_plainly(toycar: Workspace) -> None:
