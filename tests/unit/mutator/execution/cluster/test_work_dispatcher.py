@@ -2,39 +2,22 @@
 
 import asyncio
 import json
-import threading
 import time
-import warnings
 from collections.abc import Callable, Generator, Sequence
-from contextlib import asynccontextmanager
 from dataclasses import replace
-from itertools import count
-from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from distributed.client import FutureCancelledError
 
-from mutator.campaigns.chunks import pending_chunks_of
-from mutator.campaigns.plan import build_plan
-from mutator.campaigns.plan_freezing import freeze_plan
-from mutator.campaigns.run_provenance import append_session_environment
-from mutator.errors import MutatorError, MutatorWarning
-from mutator.execution.cluster import cluster_distributor
 from mutator.execution.cluster.attending_workers import AttendingWorkers
 from mutator.execution.cluster.bundle import Bundle
-from mutator.execution.cluster.cluster_distributor import ClusterDistributor
 from mutator.execution.cluster.piece_messages import Piece, PieceEnding, PieceResult
 from mutator.execution.cluster.result_intake import ResultIntake
 from mutator.execution.cluster.work_dispatcher import WorkDispatcher
-from mutator.execution.cluster.worker_roster import WorkerRoster
-from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record, Status
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.session_environments import SessionEnvironment
-from mutator.workspace import Workspace
 
 from .loops import run
 
@@ -132,35 +115,6 @@ class Workers:
     def _end(self, future: "asyncio.Future[Any]", name: str, piece: bytes) -> None:
         if not future.done():
             future.set_result(self.workers[name](Piece.from_bytes(piece)).to_bytes())
-
-
-@pytest.fixture
-def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
-    return freeze_plan(build_plan(toycar, "small"), tmp_path / "run", toycar)
-
-
-@pytest.fixture
-def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A session in which every experiment is pending, and the versions of workers are not checked."""
-    monkeypatch.setattr(Bundle, "pack_for_run", lambda *given: Bundle(b"", ""))
-    monkeypatch.setattr(WorkerRoster, "reason_to_refuse", lambda *given: "")
-    numbers = count()
-    folder = append_session_environment(folder, SessionEnvironment(python="", packages={}, platform=""))
-    return SimpleNamespace(
-        workspace=toycar,
-        folder=folder,
-        manifest=toycar.manifest("toycar"),
-        pending=pending_chunks_of(folder, {}),
-        proof=(),
-        engine="fork",
-        accept_versions=True,
-        unused_worker_name=lambda name: f"0001-{name}{next(numbers)}",
-        written=WrittenFiles(),
-        note_machine=lambda machine: None,
-        problem="",
-        interrupted=False,
-        workers_note="",
-    )
 
 
 def dealt(session: Any, workers: Workers, queued: int | None = None) -> tuple[dict[str, Record], list[str]]:
@@ -330,80 +284,3 @@ def test_no_experiment_is_given_up_while_results_are_written(
     records, _ = dealt(session, Workers(alpha=work, beta=work, gamma=work))
     assert errors(records) == [deadly]
     assert most == [1]
-
-
-def test_an_error_in_a_remark_ends_the_work(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Place:
-        @asynccontextmanager
-        async def open(self, *, insecure: bool):  # type: ignore[no-untyped-def]
-            yield None
-
-    class Remarking:
-        def __init__(self, session: Any, client: Any, remark: Callable[[str], None], **more: Any) -> None:
-            self._remark = remark
-
-        async def run(self) -> None:
-            self._remark("something")
-            await asyncio.sleep(60.0)
-
-    monkeypatch.setattr(cluster_distributor, "WorkDispatcher", Remarking)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        with pytest.raises(MutatorWarning, match="something"):
-            ClusterDistributor(Place()).run(session)
-    assert not [one for one in threading.enumerate() if one.name == "cluster" and one.is_alive()]
-
-
-class CountedPlace:
-    """A cluster that counts how often it was opened and closed."""
-
-    def __init__(self) -> None:
-        self.opened, self.closed = 0, 0
-
-    @asynccontextmanager
-    async def open(self, *, insecure: bool):  # type: ignore[no-untyped-def]
-        self.opened += 1
-        try:
-            yield None
-        finally:
-            self.closed += 1
-
-
-def test_a_cluster_stays_open_until_it_is_closed(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By default it is opened for each session; kept open, it is closed by a problem, an error, or at the
-    end. The next session opens another.
-    """
-    ends: list[Any] = []
-
-    class Ending:
-        def __init__(self, *arguments: Any, **more: Any) -> None:
-            pass
-
-        async def run(self) -> None:
-            end = ends.pop() if ends else ""
-            if isinstance(end, Exception):
-                raise end
-            session.problem = end
-
-    monkeypatch.setattr(cluster_distributor, "WorkDispatcher", Ending)
-    place = CountedPlace()
-    distributor = ClusterDistributor(place)
-    for number in (1, 2):
-        distributor.run(session)
-        assert (place.opened, place.closed) == (number, number)
-    distributor.stay_open()
-    for _ in range(3):
-        distributor.run(session)
-        assert (place.opened, place.closed) == (3, 2)
-    ends.append("the scheduler is gone")
-    distributor.run(session)
-    assert (place.opened, place.closed) == (3, 3)
-    distributor.run(session)
-    ends.append(MutatorError("wrong"))
-    with pytest.raises(MutatorError, match="wrong"):
-        distributor.run(session)
-    assert (place.opened, place.closed) == (4, 4)
-    distributor.run(session)
-    for _ in range(2):
-        distributor.close()
-    assert (place.opened, place.closed) == (5, 5)
