@@ -1,4 +1,4 @@
-"""A finished exploration of the toy, which several modules forge."""
+"""A finished exploration of the toy, which several modules forge, and the toy with a family of scenarios."""
 
 import shutil
 from collections.abc import Callable
@@ -8,6 +8,7 @@ import pytest
 
 from mutator.workspace import Workspace
 from tests.e2e.exploration_forging import Explored, explore
+from tests.e2e.toy_family import with_family
 
 
 @pytest.fixture(scope="session")
@@ -24,3 +25,9 @@ def exploration(
 def explored_run(exploration: Explored, tmp_path: Path) -> Path:
     """A copy of the run folder, to be edited."""
     return Path(shutil.copytree(exploration[1], tmp_path / "run"))
+
+
+@pytest.fixture
+def families(toy: Workspace) -> Workspace:
+    """The toy car with a family, and a campaign in its scenarios and in A."""
+    return with_family(toy)
