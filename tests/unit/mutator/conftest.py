@@ -51,11 +51,6 @@ def toy(tmp_path: Path) -> Workspace:
     return Workspace.find(root=root, templates=CLONE / "templates")
 
 
-@pytest.fixture(scope="session")
-def clone() -> Workspace:
-    return Workspace.find(root=CLONE)
-
-
 @pytest.fixture
 def fork(toycar: Workspace, tmp_path: Path) -> Iterator[Fork]:
     made = Fork(toycar, tmp_path)
