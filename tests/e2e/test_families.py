@@ -157,8 +157,8 @@ def test_edits_of_a_packed_golden_run_are_found(
     with pytest.raises(MutatorError, match="changed: "):
         mutator.load_run(out, workspace=families)
     forge_digests(out)
-    found = " ".join(map(str, mutator.verify(out, workspace=families).differences))
-    assert f"golden run {packed[0].stem} with digest" in found
+    differences = " ".join(map(str, mutator.verify(out, workspace=families).differences))
+    assert f"golden run {packed[0].stem} with digest" in differences
     whole = (out / "checks.json").read_bytes()
     checks = json.loads(whole)
     checks["goldens"][packed[0].stem] = checks["goldens"][packed[1].stem]
@@ -170,8 +170,8 @@ def test_edits_of_a_packed_golden_run_are_found(
     (out / "checks.json").write_bytes(whole)
     packed[0].write_bytes(before[:-9] + bytes(9))
     forge_digests(out)
-    found = " ".join(map(str, mutator.verify(out, workspace=families).differences))
-    assert "a damaged golden run" in found
+    differences = " ".join(map(str, mutator.verify(out, workspace=families).differences))
+    assert "a damaged golden run" in differences
     packed[0].unlink()
     mutator.verify(out, workspace=families, repair=True)
     run_campaign(families, "toy", out, engine="fork")

@@ -139,8 +139,8 @@ def test_forged_results_of_drives_are_found(families: Workspace, tmp_path: Path)
     head["plan"] = plan_digest_of_drives(run)
     (run / "run.json").write_bytes(json_bytes(head))
     forge_digests(run)
-    found = " ".join(map(str, mutator.verify(run, workspace=families).differences))
-    assert "which the campaign draws" in found
+    differences = " ".join(map(str, mutator.verify(run, workspace=families).differences))
+    assert "which the campaign draws" in differences
 
 
 def test_hazards_of_a_drive_are_listed_by_time(families: Workspace, tmp_path: Path) -> None:

@@ -14,10 +14,10 @@ from mutator.triggers.conditions import canonical_condition
 from mutator.workspace import Workspace
 
 STEP_S = 0.1
-Make = Callable[..., "Toy"]
+WithFault = Callable[..., "FaultyFunction"]
 
 
-class Toy:
+class FaultyFunction:
     """A function `f` with one injection. `names` are its globals."""
 
     def __init__(self, clone: Workspace, source: str, anchor: Anchor, model: str, **params: Value) -> None:
@@ -42,13 +42,13 @@ class Toy:
     def run(self, marks: str, *arguments: Any) -> list[Any]:
         """Return the result of `f` in each step. The fault is active in steps marked `x`. Each argument is a
         function that returns the value to pass."""
-        found = []
+        results = []
         for mark in marks:
             lead = 15.0 if mark == "x" else 20.0
             self.steps += 1
             self.probe.observe(t=self.steps * STEP_S, d_rel=40.0, v_ego=20.0, v_lead=lead)
-            found.append(self.names["f"](*(argument() for argument in arguments)))
-        return found
+            results.append(self.names["f"](*(argument() for argument in arguments)))
+        return results
 
 
 def counting() -> Callable[[], int]:

@@ -11,7 +11,7 @@ from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.parsed_files_and_anchors import parse_file
 from mutator.mutants.splicing import apply_edits, as_line_edits, mutated_bytes, unsplice
 from mutator.workspace import Workspace
-from tests.unit.templates.function_with_fault import Make, Toy, counting
+from tests.unit.templates.function_with_fault import FaultyFunction, WithFault, counting
 
 READ = "def f(queue):\n    return [content for name, content in queue]\n"
 CALLBACK = "def f(scan):\n    return scan\n"
@@ -36,24 +36,26 @@ def numbered(topic: str, counts: list[int]) -> Callable[[], list[tuple[str, int]
     ],
 )
 def test_messages_of_one_topic_are_changed_on_their_way(
-    toy: Make, model: str, more: dict[str, Value], expected: list[list[int]]
+    with_fault: WithFault, model: str, more: dict[str, Value], expected: list[list[int]]
 ) -> None:
     """Only messages of the topic are changed, only while the fault is active."""
-    made = toy(READ, AnchorKind.ENTRY, "", model, queue="queue", **SPEED, **more)
-    assert made.run(".xxx.", numbered("speed", [1] * 5)) == expected
+    faulty = with_fault(READ, AnchorKind.ENTRY, "", model, queue="queue", **SPEED, **more)
+    assert faulty.run(".xxx.", numbered("speed", [1] * 5)) == expected
 
 
-def test_messages_overtake_each_other_within_one_reading(toy: Make) -> None:
-    made = toy(READ, AnchorKind.ENTRY, "", "message_reordering", queue="queue", **SPEED)
-    assert made.run("xx", numbered("speed", [3, 1])) == [[2, 1, 0], [4, 3, 0]]
+def test_messages_overtake_each_other_within_one_reading(with_fault: WithFault) -> None:
+    faulty = with_fault(READ, AnchorKind.ENTRY, "", "message_reordering", queue="queue", **SPEED)
+    assert faulty.run("xx", numbered("speed", [3, 1])) == [[2, 1, 0], [4, 3, 0]]
 
 
-def test_an_empty_place_in_a_queue_is_no_message(toy: Make) -> None:
+def test_an_empty_place_in_a_queue_is_no_message(with_fault: WithFault) -> None:
     """openpilot's readers put None into the list for a topic without a new message."""
     source = "def f(queue):\n    return queue\n"
     for model in ("message_loss", "message_freeze", "message_repetition", "message_reordering"):
-        made = toy(source, AnchorKind.ENTRY, "", model, queue="queue", topic="message.which()", name="speed")
-        assert made.run("x", lambda: [None]) == [[None]]
+        faulty = with_fault(
+            source, AnchorKind.ENTRY, "", model, queue="queue", topic="message.which()", name="speed"
+        )
+        assert faulty.run("x", lambda: [None]) == [[None]]
 
 
 @pytest.mark.parametrize(
@@ -65,23 +67,23 @@ def test_an_empty_place_in_a_queue_is_no_message(toy: Make) -> None:
     ],
 )
 def test_a_callback_gets_no_message_or_another(
-    toy: Make, model: str, more: dict[str, Value], expected: list[int | None]
+    with_fault: WithFault, model: str, more: dict[str, Value], expected: list[int | None]
 ) -> None:
-    made = toy(CALLBACK, AnchorKind.ENTRY, "", model, message="scan", **more)
-    assert made.run(".xxx.", counting()) == expected
+    faulty = with_fault(CALLBACK, AnchorKind.ENTRY, "", model, message="scan", **more)
+    assert faulty.run(".xxx.", counting()) == expected
 
 
 LATE = {"delay": 0.2}
 
 
-def run_callback(made: Toy, calls: list[tuple[float, Any]]) -> list[Any]:
+def run_callback(faulty: FaultyFunction, calls: list[tuple[float, Any]]) -> list[Any]:
     """Return what a callback gets in each call, at these times in s; None for a call that ends at once."""
     results, now = [], -1.0
     for time, message in calls:
         if time > now:
-            made.probe.observe(t=time, d_rel=40.0, v_ego=20.0, v_lead=15.0)
+            faulty.probe.observe(t=time, d_rel=40.0, v_ego=20.0, v_lead=15.0)
             now = time
-        results.append(made.names["f"](message))
+        results.append(faulty.names["f"](message))
     return results
 
 
@@ -96,21 +98,21 @@ def run_callback(made: Toy, calls: list[tuple[float, Any]]) -> list[Any]:
     ],
 )
 def test_a_late_message_of_a_callback_waits_for_a_call_of_its_own(
-    toy: Make, times: list[float], expected: list[int | None]
+    with_fault: WithFault, times: list[float], expected: list[int | None]
 ) -> None:
     """Messages that are due together come one by one, in order; none vanishes."""
-    made = toy(CALLBACK, AnchorKind.ENTRY, "", "message_delay", message="scan", **LATE)
-    assert run_callback(made, list(zip(times, range(len(times)), strict=True))) == expected
+    faulty = with_fault(CALLBACK, AnchorKind.ENTRY, "", "message_delay", message="scan", **LATE)
+    assert run_callback(faulty, list(zip(times, range(len(times)), strict=True))) == expected
 
 
-def test_late_messages_of_a_topic_leave_the_others_of_a_callback_alone(toy: Make) -> None:
+def test_late_messages_of_a_topic_leave_the_others_of_a_callback_alone(with_fault: WithFault) -> None:
     """Messages of the other topic come in time; those of the topic come late, in calls of their topic."""
-    made = toy(CALLBACK, AnchorKind.ENTRY, "", "message_delay", message="scan", **SPEED, **LATE)
+    faulty = with_fault(CALLBACK, AnchorKind.ENTRY, "", "message_delay", message="scan", **SPEED, **LATE)
     calls = [(i / 10, (name, i)) for i in range(4) for name in ("speed", "gear")]
     calls += [(0.7, ("gear", 7)), (0.7, ("speed", 7)), (0.7, ("speed", 8)), (0.7, ("gear", 9))]
     expected = [None, ("gear", 0), None, ("gear", 1), ("speed", 0), ("gear", 2), ("speed", 1), ("gear", 3)]
     expected += [("gear", 7), ("speed", 2), ("speed", 3), ("gear", 9)]
-    assert run_callback(made, calls) == expected
+    assert run_callback(faulty, calls) == expected
 
 
 @pytest.mark.parametrize(
@@ -122,21 +124,25 @@ def test_late_messages_of_a_topic_leave_the_others_of_a_callback_alone(toy: Make
     ],
 )
 def test_a_sender_can_fill_the_same_message_again(
-    toy: Make, model: str, more: dict[str, Value], expected: list[list[int]]
+    with_fault: WithFault, model: str, more: dict[str, Value], expected: list[list[int]]
 ) -> None:
     """Messages are copied when they come, so a later content does not replace theirs."""
     source = "def f(queue):\n    return [message['number'] for message in queue]\n"
-    made, number, message = toy(source, AnchorKind.ENTRY, "", model, queue="queue", **more), counting(), {}
+    faulty, number, message = (
+        with_fault(source, AnchorKind.ENTRY, "", model, queue="queue", **more),
+        counting(),
+        {},
+    )
 
     def send() -> list[dict[str, int]]:
         message["number"] = number()
         return [message]
 
-    assert made.run(".xxx", send) == expected
+    assert faulty.run(".xxx", send) == expected
 
 
-def test_a_late_message_of_a_callback_is_a_copy(toy: Make) -> None:
-    made = toy(
+def test_a_late_message_of_a_callback_is_a_copy(with_fault: WithFault) -> None:
+    faulty = with_fault(
         "def f(scan):\n    return scan[0]\n", AnchorKind.ENTRY, "", "message_delay", message="scan", **LATE
     )
     ranges = [0.0]
@@ -145,13 +151,13 @@ def test_a_late_message_of_a_callback_is_a_copy(toy: Make) -> None:
         ranges[0] += 1.0
         return ranges
 
-    assert made.run(".xxxx", scan) == [1.0, None, None, 2.0, 3.0]
+    assert faulty.run(".xxxx", scan) == [1.0, None, None, 2.0, 3.0]
 
 
-def test_the_reader_of_a_frozen_message_can_change_it(toy: Make) -> None:
+def test_the_reader_of_a_frozen_message_can_change_it(with_fault: WithFault) -> None:
     source = "def f(queue):\n    return [message.pop() for message in queue]\n"
-    made = toy(source, AnchorKind.ENTRY, "", "message_freeze", queue="queue")
-    assert made.run("xx", lambda: [[1, 2]]) == [[2], [2]]
+    faulty = with_fault(source, AnchorKind.ENTRY, "", "message_freeze", queue="queue")
+    assert faulty.run("xx", lambda: [[1, 2]]) == [[2], [2]]
 
 
 @pytest.mark.parametrize(
@@ -165,15 +171,15 @@ def test_the_reader_of_a_frozen_message_can_change_it(toy: Make) -> None:
     ],
 )
 def test_a_fault_counts_where_a_message_of_its_topic_comes(
-    toy: Make, model: str, more: dict[str, Value]
+    with_fault: WithFault, model: str, more: dict[str, Value]
 ) -> None:
     """Readings without such a message, and those outside of the trigger, do not count."""
-    made = toy(READ, AnchorKind.ENTRY, "", model, queue="queue", **SPEED, **more)
-    made.run("xx", numbered("sped", [1, 1]))
-    made.run(".", numbered("speed", [1]))
-    assert made.probe.report()["injections"]["ab12"]["count"] == 0
-    made.run("xxx", numbered("speed", [0, 2, 0]))
-    entry = made.probe.report()["injections"]["ab12"]
+    faulty = with_fault(READ, AnchorKind.ENTRY, "", model, queue="queue", **SPEED, **more)
+    faulty.run("xx", numbered("sped", [1, 1]))
+    faulty.run(".", numbered("speed", [1]))
+    assert faulty.probe.report()["injections"]["ab12"]["count"] == 0
+    faulty.run("xxx", numbered("speed", [0, 2, 0]))
+    entry = faulty.probe.report()["injections"]["ab12"]
     assert (entry["count"], entry["first"], entry["last"]) == (1, 0.5, 0.5)
 
 

@@ -19,7 +19,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         (
             "params: {by_m: error}",
@@ -194,5 +194,5 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         ),
     ],
 )
-def test_a_mistake_is_reported_with_a_remedy(toy: Workspace, old: str, new: str, said: str) -> None:
-    assert said.replace("{KNOWN}", UNIT_SUFFIXES_TEXT) in edited(toy, old, new)
+def test_a_mistake_is_reported_with_a_remedy(toy: Workspace, old: str, new: str, message: str) -> None:
+    assert message.replace("{KNOWN}", UNIT_SUFFIXES_TEXT) in edited(toy, old, new)

@@ -11,15 +11,15 @@ from mutator.faults.spec_expansion import draw_values
 from mutator.model import Fault, Hold
 from mutator.workspace import Workspace
 from tests.costs import is_cheap
-from tests.unit.mutator.faults.toy_faults import NAME, faults
+from tests.unit.mutator.faults.toy_faults import SPEC_NAME, faults
 
 
-def of(found: tuple[Fault, ...], variant: str) -> list[Fault]:
-    return [fault for fault in found if fault.spec == f"{NAME}/{variant}"]
+def of(expanded: tuple[Fault, ...], variant: str) -> list[Fault]:
+    return [fault for fault in expanded if fault.spec == f"{SPEC_NAME}/{variant}"]
 
 
 def test_a_spec_keeps_the_order_of_its_variants(toy: Workspace) -> None:
-    spec = toy.spec(NAME)
+    spec = toy.spec(SPEC_NAME)
     assert [v.name for v in spec] == ["longer", "silent", "both"]
     assert [v.fault_count for v in spec] == [3, 1, 2]
     assert spec.fault_count == 6 == len(faults(toy))
@@ -27,11 +27,11 @@ def test_a_spec_keeps_the_order_of_its_variants(toy: Workspace) -> None:
 
 
 def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
-    found = of(faults(toy), "longer")
-    assert [f.value // 10 for f in found] == [1, 2, 3]
-    assert all(isinstance(f.value, int) and f.unit == "m" and f.aim == "H1" for f in found)
-    assert [dict(f.injections[0].params) for f in found] == [
-        {"by": float(f.value), "target": "gap"} for f in found
+    longer = of(faults(toy), "longer")
+    assert [f.value // 10 for f in longer] == [1, 2, 3]
+    assert all(isinstance(f.value, int) and f.unit == "m" and f.aim == "H1" for f in longer)
+    assert [dict(f.injections[0].params) for f in longer] == [
+        {"by": float(f.value), "target": "gap"} for f in longer
     ]
 
 
@@ -43,10 +43,10 @@ def test_neighbouring_values_meet_the_same_noise(toy: Workspace, model: str, see
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     text = path.read_text().replace("model: offset\n", f"model: {model}\n", 1)
     path.write_text(text.replace("params: {by_m: error}", f"params: {params}", 1))
-    found = of(faults(toy), "longer")
-    assert len(found) == 3
-    assert len({dict(f.injections[0].params)["seed"] for f in found}) == seed_count
-    both = (*found, *of(faults(toy, seed=4), "longer"))
+    longer = of(faults(toy), "longer")
+    assert len(longer) == 3
+    assert len({dict(f.injections[0].params)["seed"] for f in longer}) == seed_count
+    both = (*longer, *of(faults(toy, seed=4), "longer"))
     assert len({dict(f.injections[0].params)["seed"] for f in both}) == 2 * seed_count
 
 
@@ -75,7 +75,7 @@ def test_a_fault_has_the_hold_and_the_changes_of_its_variant(toy: Workspace) -> 
 
 
 def test_a_reading_can_override_the_hold(toy: Workspace) -> None:
-    path = toy.spec(NAME).path
+    path = toy.spec(SPEC_NAME).path
     text = path.read_text()
     both = text.index("as_coded:", text.index("both:"))
     path.write_text(text[:both] + text[both:].replace("as_coded:", "as_coded:\n      hold: to_end", 1))
@@ -163,10 +163,14 @@ def paired(workspace: Workspace, old: str = "", new: str = "") -> Path:
 def test_the_nth_values_of_several_lists_make_one_fault(toy: Workspace) -> None:
     """The first value names the fault; each injection gets its own, in the unit of its variable."""
     paired(toy)
-    found = faults(toy)
-    assert [(f.value, f.unit) for f in found] == [(3, "m"), (1, "m"), (2, "m")]
-    assert [[dict(i.params)["by"] for i in f.injections] for f in found] == [[3, -10], [1, -20], [2, -5]]
-    assert len({f.id for f in found}) == 3
+    paired_faults = faults(toy)
+    assert [(f.value, f.unit) for f in paired_faults] == [(3, "m"), (1, "m"), (2, "m")]
+    assert [[dict(i.params)["by"] for i in f.injections] for f in paired_faults] == [
+        [3, -10],
+        [1, -20],
+        [2, -5],
+    ]
+    assert len({f.id for f in paired_faults}) == 3
 
 
 def test_a_list_alone_makes_the_faults_that_it_made_before_lists_could_be_paired(toy: Workspace) -> None:
@@ -176,7 +180,7 @@ def test_a_list_alone_makes_the_faults_that_it_made_before_lists_could_be_paired
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ("[36, 72, 18]", "[36, 72]", "10: 2 values; expected 3, as many as in `error_m`"),
         ("[3, 1, 2]", "[3, 1, 3]", "9: 3 twice; expected different values in the first of several lists"),
@@ -189,11 +193,11 @@ def test_a_list_alone_makes_the_faults_that_it_made_before_lists_could_be_paired
         ),
     ],
 )
-def test_lists_that_are_no_pairs_are_refused(toy: Workspace, old: str, new: str, said: str) -> None:
+def test_lists_that_are_no_pairs_are_refused(toy: Workspace, old: str, new: str, message: str) -> None:
     path = paired(toy, old, new)
     with pytest.raises(MutatorError) as caught:
         faults(toy)
-    assert said in str(caught.value).replace(f"{path}:", "")
+    assert message in str(caught.value).replace(f"{path}:", "")
 
 
 def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Workspace) -> None:

@@ -4,12 +4,12 @@ from mutator.faults.spec_expansion import expand_spec
 from mutator.model import Fault
 from mutator.workspace import Workspace
 
-NAME = "sensor/distance"
+SPEC_NAME = "sensor/distance"
 
 
 def faults(workspace: Workspace, seed: int = 3, reading: str | None = None) -> tuple[Fault, ...]:
     return expand_spec(
-        workspace.spec(NAME),
+        workspace.spec(SPEC_NAME),
         seed,
         reading,
         models=workspace.fault_models(),

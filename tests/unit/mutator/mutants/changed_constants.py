@@ -250,9 +250,12 @@ def mutant(clone: Workspace, *locations: FaultLocation) -> bytes:
     file = parse_file("m.py", SOURCE.encode(), Path("x"))
     edits = [
         injection_edit(
-            file, clone.fault_models(), Injection(location=one, model="offset", params=(("by", 10.0),)), name
+            file,
+            clone.fault_models(),
+            Injection(location=location, model="offset", params=(("by", 10.0),)),
+            name,
         )
-        for one, name in zip(locations, ("a", "b", *(f"{n:08x}" for n in range(30))), strict=False)
+        for location, name in zip(locations, ("a", "b", *(f"{n:08x}" for n in range(30))), strict=False)
     ]
     data = mutated_bytes(apply_edits(file, as_line_edits(file, [probe_import_edit(file, None), *edits])))
     assert unsplice(data) == file.data

@@ -13,7 +13,7 @@ from tests.unit.mutator.mutants.changed_constants import PLACES, SOURCE, at, mut
 
 
 def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace) -> None:
-    lines = mutant(clone, *dict.fromkeys(one for one, _ in PLACES.values())).decode().splitlines()
+    lines = mutant(clone, *dict.fromkeys(location for location, _ in PLACES.values())).decode().splitlines()
     tagged = [i for i, line in enumerate(lines) if "# fi:" in line][1:]
     assert [lines[i - 1].strip() for i in tagged if i - 1 not in tagged] == [
         "LIMIT = 5",

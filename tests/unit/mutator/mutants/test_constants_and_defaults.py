@@ -20,7 +20,7 @@ def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
     is active from 1 s to 3 s."""
     names = ("_fi", "fixed_values_m")
 
-    def made(*locations: FaultLocation) -> tuple[Any, Any]:
+    def load_mutant(*locations: FaultLocation) -> tuple[Any, Any]:
         nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
         observation = Observation(location=nowhere, time="t", values=(), derived=())
         trigger = Trigger(name="test", condition="t >= 1 and t < 3")
@@ -34,7 +34,7 @@ def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
         exec(compile(mutant(clone, *locations), "m.py", "exec", dont_inherit=True), vars(module))
         return module, probe
 
-    yield made
+    yield load_mutant
     for name in names:
         sys.modules.pop(name, None)
 
@@ -45,11 +45,11 @@ def test_a_fixed_value_changes_while_the_fault_is_active(
 ) -> None:
     location, value = PLACES[place]
     module, fi = load(location)
-    original, seen = value(module), []
+    original, changes = value(module), []
     for t in (0, 1, 2, 3, 4, 0, 1, 2, 0):
         fi.observe(t=float(t))
-        seen.append(value(module) - original)
-    assert seen == [0, 10, 10, 0, 0, 0, 10, 10, 0]
+        changes.append(value(module) - original)
+    assert changes == [0, 10, 10, 0, 0, 0, 10, 10, 0]
     fi.observe(t=1.0)
     assert fi.report()["injections"]["a"] == {"first": 1.0, "last": 1.0, "count": 1}
 

@@ -27,8 +27,8 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 @pytest.fixture
 def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> Any:
     """A session in which every experiment is pending, and the versions of workers are not checked."""
-    monkeypatch.setattr(Bundle, "pack_for_run", lambda *given: Bundle(b"", ""))
-    monkeypatch.setattr(WorkerRoster, "reason_to_refuse", lambda *given: "")
+    monkeypatch.setattr(Bundle, "pack_for_run", lambda *arguments: Bundle(b"", ""))
+    monkeypatch.setattr(WorkerRoster, "reason_to_refuse", lambda *arguments: "")
     numbers = count()
     folder = append_session_environment(folder, SessionEnvironment(python="", packages={}, platform=""))
     return SimpleNamespace(

@@ -33,7 +33,7 @@ def test_an_error_in_a_remark_ends_the_work(session: Any, monkeypatch: pytest.Mo
         warnings.simplefilter("error")
         with pytest.raises(MutatorWarning, match="something"):
             ClusterDistributor(Place()).run(session)
-    assert not [one for one in threading.enumerate() if one.name == "cluster" and one.is_alive()]
+    assert not [thread for thread in threading.enumerate() if thread.name == "cluster" and thread.is_alive()]
 
 
 class CountedPlace:

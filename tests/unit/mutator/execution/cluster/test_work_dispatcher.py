@@ -84,11 +84,11 @@ class Workers:
         self._open: list[tuple[str, asyncio.Future[Any]]] = []
 
     async def identity(self, n_workers: int) -> dict[str, Any]:
-        told = {name: {"id": name, "name": name, "nthreads": 1} for name in self.workers}
-        return {"workers": {f"tcp://{name}": one for name, one in told.items()}}
+        identities = {name: {"id": name, "name": name, "nthreads": 1} for name in self.workers}
+        return {"workers": {f"tcp://{name}": identity for name, identity in identities.items()}}
 
     def submit(
-        self, function: Callable[..., Any], *given: Any, workers: Sequence[str], **more: Any
+        self, function: Callable[..., Any], *arguments: Any, workers: Sequence[str], **more: Any
     ) -> Answer:
         future = asyncio.get_running_loop().create_future()
         self._open.append((function.__name__, future))
@@ -98,7 +98,7 @@ class Workers:
         if function.__name__ == "run_piece":
             self.began.append(name)
             asyncio.get_running_loop().call_later(
-                self.seconds.get(name, 0.02), self._end, future, name, given[1]
+                self.seconds.get(name, 0.02), self._end, future, name, arguments[1]
             )
             if len(self.began) == self.cut_at:
                 self.drop_tasks()
@@ -132,7 +132,7 @@ def dealt(session: Any, workers: Workers, queued: int | None = None) -> tuple[di
 
 
 def errors(records: dict[str, Record]) -> list[str]:
-    return [name for name, one in records.items() if one.status is Status.HARNESS_ERROR]
+    return [name for name, record in records.items() if record.status is Status.HARNESS_ERROR]
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,9 @@ def test_no_experiment_is_blamed_for_a_failing_worker(session: Any, ending: Piec
     )
     records, remarks = dealt(session, workers)
     assert (len(records), errors(records), session.problem) == (12, [], "")
-    assert [one for one in remarks if one.startswith("worker odd at ") and one.endswith("the reason")]
+    assert [
+        remark for remark in remarks if remark.startswith("worker odd at ") and remark.endswith("the reason")
+    ]
 
 
 @pytest.mark.parametrize("ending", [PieceEnding.PROCESS_DIED, PieceEnding.HARNESS_FAILED])
@@ -268,11 +270,11 @@ def test_no_experiment_is_given_up_while_results_are_written(
     inside, most = [0], [0]
 
     def slow(real: Callable[..., None]) -> Callable[..., None]:
-        def call(*given: Any) -> None:
+        def call(*arguments: Any) -> None:
             inside[0] += 1
             most[0] = max(most[0], inside[0])
             time.sleep(0.2)
-            real(*given)
+            real(*arguments)
             inside[0] -= 1
 
         return call
