@@ -46,8 +46,9 @@ their ranges for a command do not overlap.
 
 ## The model
 
-A model uses only a few modules of the standard library, and no clock, file or shared random state. It is
-one class:
+A model uses only public functions of a few modules of the standard library, and no clock, file or shared
+random state. Its source is checked for that, which keeps honest mistakes out; it is no sandbox. It
+is one class:
 
 ```python
 class Model:

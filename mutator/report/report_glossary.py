@@ -20,7 +20,8 @@ _COUNTING_TERMS = {
     "FTTI": "the fault tolerant time interval: the shortest time from a fault to a hazardous event, if no "
     "safety mechanism acts (ISO 26262-1:2018); the shortest time of the sampled runs "
     "whose fault was still active is an upper bound",
-    "margin": "the distance that a run kept from a hazard, negative once the hazard has occurred",
+    "margin": "the distance that a run kept from the limit of a hazard, negative beyond it; some hazards "
+    "need more than a moment beyond it",
     "end of the drive": "the first terminal hazard, such as a contact: the simulation continues, but metrics "
     "and fault paths leave out later steps",
     "rank": "1 is the worst; the order is by severity, silent hazards first, then by margin and time",
