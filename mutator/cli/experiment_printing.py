@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mutator.api.experiment_results import ExperimentResult
     from mutator.api.run_experiments import RunExperiment
     from mutator.api.trials import Trial
-    from mutator.model import Experiment, Record
+    from mutator.model import DefenceActivity, Experiment, Record
     from mutator.outcomes.fault_paths import PathComponent
     from mutator.results.result_rows import ResultRow
     from mutator.targets.manifest import TargetManifest
@@ -178,6 +178,8 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
             for t, label in sorted(events, key=lambda e: e[0])
         ]
         terminal.print_table(["time [s]", "from activation [s]", "what"], rows, right_aligned=(0, 1))
+    for line in _describe_defences(record, manifest):
+        terminal.print_text(line)
     verdict = result.verdict
     if manifest and (note := _missing_alert_note(record, manifest, verdict["reaction_time_s"])):
         terminal.print_text(note)
@@ -214,6 +216,30 @@ def _describe_values(values: Iterable[tuple[str, float]], unit_by_name: Mapping[
     texts = (f"{name} {value:.4g} {unit_by_name.get(name, '')}".rstrip() for name, value in values)
     # keep a value and its unit on one line
     return ", ".join(text.replace(" ", NO_BREAK_SPACE) for text in texts)
+
+
+def _describe_defences(record: "Record", manifest: "TargetManifest | None") -> list[str]:
+    """Return a line for each defence that acted; a line without one if there are defences in the tree."""
+    if record.run_end is None:  # only runs with defences have one
+        return []
+    actuation = manifest.actuation if manifest else None
+    units = (
+        {command.name: command.unit for command in actuation.commands if command.unit != "-"}
+        if actuation
+        else {}
+    )
+    return [_describe_activity(activity, units) for activity in record.defences] or ["no defence acted"]
+
+
+def _describe_activity(activity: "DefenceActivity", unit_by_command: Mapping[str, str]) -> str:
+    """Return a line such as `defence aeb: first acted at 3.85 s, 1 activation, 40 steps; ...`."""
+    values = _describe_values(((name, value) for name, _, value in activity.commands), unit_by_command)
+    commanded = f"; furthest from 0, it commanded {values}" if values else ""
+    return (
+        f"defence {activity.name}: first acted at {activity.first:.2f} s, "
+        f"{counted(activity.activations, 'activation')}, {counted(activity.steps, 'step')} "
+        f"until {activity.last:.2f} s{commanded}"
+    )
 
 
 def _missing_alert_note(record: "Record", manifest: "TargetManifest", reaction_s: float | None) -> str:
@@ -254,6 +280,7 @@ def _list_events(record: "Record", manifest: "TargetManifest | None") -> list[tu
         events.append((record.activation.last, "fault last active"))
     if record.t_manifest is not None:
         events.append((record.t_manifest, "manifested: an actuator differs from the golden run"))
+    events += [(activity.first, f"defence {activity.name} first acts") for activity in record.defences]
     events += [(t, f"alert {name}") for name, t in record.alerts]
     events += [(t, f"hazard {name}{meaning_by_hazard.get(name, '')}") for name, t in record.hazards]
     if (end := record.t_end) is None:

@@ -153,6 +153,8 @@ def _experiment_facts(
         "run_with": experiment.stretch,
         "has_series": experiment.has_series,
     }
+    if experiment.record and experiment.record.run_end:  # a run with defences
+        facts |= {"defences": [asdict(activity) for activity in experiment.record.defences]}
     return facts | {"path": asdict(experiment.fault_path) if experiment.fault_path else None}
 
 

@@ -14,6 +14,7 @@ from mutator.results.columns_of_defences import (
     DEFENCE,
     DRIVER_AT_END,
     END_SPEED,
+    FIRST_ACTED,
 )
 from mutator.results.result_rows import ResultRow
 
@@ -34,12 +35,31 @@ class PairOutcome(StrEnum):
     NO_HAZARD = "no_hazard"  # in neither run
     NOT_COMPARED = "not_compared"  # one of the runs crashed, or is no result
 
+    @property
+    def words(self) -> str:
+        return self.value.replace("_", " ")
+
+
+PAIR_OUTCOME_MEANINGS = {
+    PairOutcome.PREVENTED: "no hazard until the end, and at the end the fault is over for the campaign's "
+    "`observe_s`, the car stands, or a driver has it",
+    PairOutcome.OPEN: "no hazard either, but the drive ends too early to call it prevented",
+    PairOutcome.REPLACED: "another hazard instead; this is never prevented",
+    PairOutcome.MITIGATED: "the same hazard, less severe; or as severe, with fewer others",
+    PairOutcome.UNCHANGED: "the same hazards, as severe",
+    PairOutcome.WORSENED: "the same hazard, more severe; or as severe, with more others",
+    PairOutcome.CAUSED: "a hazard in an experiment that has none without the defences",
+    PairOutcome.NO_HAZARD: "no hazard, without and with the defences",
+    PairOutcome.NOT_COMPARED: "one of the two runs crashed, or has no result",
+}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefendedRow:
     """What a defended run adds to its row.
 
-    * `acted`: the defences that acted; `conflict_steps`: steps in which two disagreed
+    * `acted`: the defences that acted; `first_acted_s`: when one first did, in s; None if none did
+    * `conflict_steps`: steps in which two disagreed
     * `after_fault_s`: how long the drive went on after the fault; None if it was never active
     * `end_speed`: in m/s, at the end of the drive; None if it is not known
     * `driver_at_end`: whether a driver acted in the last step
@@ -52,12 +72,14 @@ class DefendedRow:
     end_speed: float | None
     driver_at_end: bool
     authority: Mapping[str, float]
+    first_acted_s: float | None = None
 
     @classmethod
     def of_cells(cls, cells: Mapping[str, Any]) -> "DefendedRow":
         """Return what the cells of a row of results say."""
         return cls(
             acted=tuple(filter(None, (cells[DEFENCE] or "").split(";"))),
+            first_acted_s=cells[FIRST_ACTED],
             conflict_steps=int(cells[CONFLICTS] or 0),
             after_fault_s=cells[AFTER_FAULT],
             end_speed=cells[END_SPEED],
@@ -85,6 +107,14 @@ class DefendedPair:
     def is_unneeded_activation(self) -> bool:
         """Whether a defence acted although the undefended run has no hazard."""
         return bool(self.facts.acted) and self.outcome in (PairOutcome.NO_HAZARD, PairOutcome.CAUSED)
+
+    @property
+    def what_became(self) -> str:
+        """What became of the experiment, in words: `prevented`, `replaced by H4`, `caused H4`."""
+        hazards = ", ".join(name for name, _ in self.defended.hazards)
+        if self.outcome is PairOutcome.REPLACED:
+            return f"replaced by {hazards}"
+        return f"caused {hazards}" if self.outcome is PairOutcome.CAUSED else self.outcome.words
 
 
 def pair_of(undefended: ResultRow, defended: ResultRow, facts: DefendedRow, observe_s: float) -> DefendedPair:

@@ -4,9 +4,9 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from mutator.comparison.defended_pairs import DefendedPair, PairOutcome
+from mutator.comparison.defence_cost_sheets import cost_sheets
+from mutator.comparison.defended_contacts_sheet import contacts_sheet
+from mutator.comparison.defended_pairs import PAIR_OUTCOME_MEANINGS, DefendedPair, PairOutcome
 from mutator.comparison.defended_sets import DefendedSet
 from mutator.comparison.paired_rate_and_time_sheets import weights_of_experiments
 from mutator.results.result_rows import ResultRow
@@ -27,6 +27,10 @@ _HAZARD_OUTCOMES = (
     PairOutcome.UNCHANGED,
     PairOutcome.WORSENED,
 )
+_MEANINGS = " ".join(
+    f"*{outcome.words.capitalize()}*: {PAIR_OUTCOME_MEANINGS[outcome]}."
+    for outcome in (*_HAZARD_OUTCOMES, PairOutcome.CAUSED, PairOutcome.NOT_COMPARED)
+)
 _NONE, _OPEN = "none", "open"  # columns of the matrix of hazards
 
 
@@ -37,10 +41,10 @@ def defence_sheets(sets: Sequence[DefendedSet], hazards: Sequence[str]) -> tuple
         _rates_sheet(sets),
         _hazards_sheet(sets, hazards),
         _severity_sheet(sets),
-        _authority_sheet(sets),
-        _golden_sheet(sets),
-        _unneeded_sheet(sets),
+        contacts_sheet(sets),
+        *cost_sheets(sets),
         _pairs_sheet(sets),
+        _experiments_sheet(sets),
     )
 
 
@@ -48,8 +52,8 @@ def _outcomes_sheet(sets: Iterable[DefendedSet]) -> Sheet:
     return Sheet(
         name="defences",
         title="What defences did with hazards",
-        note="Experiments with a hazard in the undefended run, by what became of it with each set; `caused` "
-        "are those that had none, `not compared` those whose run with defences crashed or has no result. "
+        note="Experiments with a hazard in the undefended run, by what became of it with each set. "
+        f"{_MEANINGS} Of the *not compared*, only those with a hazard are counted. "
         "False activations are counted by fault-free drive. The interval of the prevented share resamples "
         "whole faults. A sample's share is weighted; counts are not.",
         heads=(
@@ -182,84 +186,6 @@ def _severity_sheet(sets: Iterable[DefendedSet]) -> Sheet:
     )
 
 
-def _authority_sheet(sets: Iterable[DefendedSet]) -> Sheet:
-    lines: list[tuple[SheetCell, ...]] = []
-    for defended in sets:
-        commands = dict.fromkeys(name for pair in defended.pairs for name in pair.facts.authority)
-        for command in commands:
-            values = [
-                pair.facts.authority[command] for pair in defended.pairs if command in pair.facts.authority
-            ]
-            largest = max(values, key=abs)
-            lines.append((defended.name, command, len(values), float(np.median(values)), float(largest)))
-    return Sheet(
-        name="defence_authority",
-        title="Commands that defences needed",
-        note="Of the experiments in which the set gave this command: the value furthest from 0 in each, in "
-        "the command's unit.",
-        heads=("defences", "command", "experiments", "median", "largest"),
-        lines=tuple(lines),
-    )
-
-
-def _golden_sheet(sets: Iterable[DefendedSet]) -> Sheet:
-    return Sheet(
-        name="defences_without_faults",
-        title="Defences in fault-free drives",
-        note="What defences did without a fault. An activation is false if the undefended drive has no "
-        "hazard.",
-        heads=("defences", "drive", "defence", "first at (s)", "activations", "largest", "false", "hazards"),
-        lines=tuple(
-            (
-                defended.name,
-                activity.golden,
-                activity.activity.name,
-                activity.activity.first,
-                activity.activity.activations,
-                _largest_commands(activity.activity.commands),
-                "yes" if activity.is_false else "no",
-                ", ".join(activity.defended_hazards) or _NONE,
-            )
-            for defended in sets
-            for activity in defended.golden_activities
-        ),
-    )
-
-
-def _largest_commands(commands: Iterable[tuple[str, float, float]]) -> str:
-    return ", ".join(f"{name} {value:.3g}" for name, _, value in commands)
-
-
-def _unneeded_sheet(sets: Iterable[DefendedSet]) -> Sheet:
-    names = dict.fromkeys(
-        name
-        for defended in sets
-        for pair in defended.pairs
-        if pair.is_unneeded_activation
-        for name, _ in pair.undefended.margins
-    )
-    lines: list[tuple[SheetCell, ...]] = []
-    for defended in sets:
-        for pair in defended.pairs:
-            if pair.is_unneeded_activation:
-                margins = dict(pair.undefended.margins)
-                lines.append(
-                    (
-                        *(defended.name, pair.undefended.experiment_id, pair.undefended.fault),
-                        *(pair.undefended.scenario_label, ", ".join(pair.facts.acted)),
-                        *(margins.get(name) for name in names),
-                    )
-                )
-    return Sheet(
-        name="unneeded_activations",
-        title="Unneeded activations",
-        note="Defences that acted in experiments whose undefended run has no hazard, with the margins of "
-        "that run: small ones were close calls.",
-        heads=("defences", "experiment", "fault", "scenario", "acted", *(f"margin {name}" for name in names)),
-        lines=tuple(lines),
-    )
-
-
 def _pairs_sheet(sets: Iterable[DefendedSet]) -> Sheet:
     return Sheet(
         name="defended_pairs",
@@ -287,6 +213,29 @@ def _pair_lines(sets: Iterable[DefendedSet]) -> Iterator[tuple[SheetCell, ...]]:
                 (after.delta_v or 0.0) - (before.delta_v or 0.0) if both_touch else None,
                 ", ".join(pair.facts.acted) or None,
             )
+
+
+def _experiments_sheet(sets: Sequence[DefendedSet]) -> Sheet:
+    pairs_by_id = [{pair.undefended.experiment_id: pair for pair in defended.pairs} for defended in sets]
+    undefended = sets[0].undefended
+    rows = [undefended.row_by_id[e.id] for e in undefended.experiments if e.id in undefended.row_by_id]
+    return Sheet(
+        name="defended_experiments",
+        title="What became of each experiment with defences",
+        note="One row for each experiment, one column for each set. An empty cell: the set has no result of "
+        "it yet.",
+        heads=("experiment", "fault", "scenario", "trigger", "undefended", *(f"with {d.name}" for d in sets)),
+        lines=tuple(
+            (
+                *(row.experiment_id, row.fault, row.scenario_label, row.trigger, _hazard_text(row)),
+                *(
+                    pairs[row.experiment_id].what_became if row.experiment_id in pairs else None
+                    for pairs in pairs_by_id
+                ),
+            )
+            for row in rows
+        ),
+    )
 
 
 def _hazard_text(row: ResultRow) -> str:

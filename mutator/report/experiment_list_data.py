@@ -25,6 +25,7 @@ from mutator.report.heat_map_data import build_heat_map
 from mutator.report.panel import REPORT_FOLDER
 from mutator.report.report_glossary import code_meanings_by_column
 from mutator.report.reported_run import ReportedRun, manifest_if_any
+from mutator.report.reported_sets import list_columns, page_details, page_facts
 from mutator.report.series_for_report_page import series_facts_for_page
 from mutator.report.source_lines_with_outcomes import SourceLines
 from mutator.results.experiment_sentence import ExperimentSentences
@@ -87,7 +88,10 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
     data["media"] = media_by_experiment(folder, folder.path / REPORT_FOLDER, MOST_EMBEDDED_STILL_BYTES)
     if run.run_fault_paths:
         data["paths"] = run.run_fault_paths.page_data(ids)
+    if sets := run.defended_sets():
+        data["defences"] = page_details(sets, ids)
     facts = {
+        **({"defences": page_facts(sets)} if sets else {}),
         **_film_and_scene_facts(folder, workspace),
         "series": series_facts_for_page(folder),
         "metrics": folder.head.metrics,
@@ -166,6 +170,7 @@ def _list_table_data(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:
         has_alerts=run.folder.has_alerts,
         source=run.source_lines,
         sentences=ExperimentSentences.of_run(run.folder.head),
+        more_columns=list_columns(run.defended_sets(), listed["experiment_id"].tolist()),
     )
     if scale := run.folder.severity_scale:
         data["severities"] = scale.labels
@@ -190,6 +195,7 @@ def results_table_data(
     has_alerts: bool = True,
     source: SourceLines | None = None,
     sentences: ExperimentSentences | None = None,
+    more_columns: Mapping[str, Sequence[str]] | None = None,
 ) -> dict[str, Any]:
     """Return the results by column, with derived columns such as `rank` (1: the worst). In `scenario`, those
     of a family have its name, so that filters and maps count them as one. Alert columns need a
@@ -215,6 +221,7 @@ def results_table_data(
         columns["through"] = paths.joined_passed_links(results[UNTIMED_PATH_COLUMN])
     if source:
         columns |= _operator_columns(source, results, rows)
+    columns |= more_columns or {}
     columns_data = [{"name": name, **column_data(name, values)} for name, values in columns.items()]
     labels = {name: facts["label"] for name, facts in paths.components.items()} if paths else {}
     checked_hazards = list(checked_hazard_names(results))

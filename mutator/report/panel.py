@@ -18,7 +18,8 @@ REPORT_FOLDER = "report"  # the report's folder in a run folder
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
     """One part of a report. `link` is its name in the navigation bar, `summary` the table that the command
-    line shows, `style` a CSS file that it needs. `files` are written next to the report, by name.
+    line shows, `style` a CSS file that it needs, `script` one that adds to the list of experiments. `files`
+    are written next to the report, by name.
     """
 
     anchor: str  # its id on the page
@@ -28,6 +29,7 @@ class Panel:
     summary: TextTable | None = None
     files: Mapping[str, bytes] = field(default_factory=dict)
     style: str = ""
+    script: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

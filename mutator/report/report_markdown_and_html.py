@@ -11,6 +11,8 @@ from mutator.report.panel import Panel, ReportPage, rendered
 from mutator.report.report_glossary import Glossary
 from mutator.web import asset_text, csp_hash, json_script_element, load_order
 
+_START_SCRIPT = "report/report.js"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportContent:
@@ -70,7 +72,7 @@ def report_html(content: ReportContent, *, is_alone: bool = False) -> str:
     """
     from markupsafe import Markup
 
-    scripts = [asset_text(name) for name in load_order("report", ".js")]
+    scripts = [asset_text(name) for name in _script_names(content)]
     html = rendered(
         asset_text("report/report.html"),
         content=content,
@@ -87,6 +89,16 @@ def report_html(content: ReportContent, *, is_alone: bool = False) -> str:
         policy=_policy_without_requests(scripts) if is_alone else "",
     )
     return str(html)
+
+
+def _script_names(content: ReportContent) -> list[str]:
+    """Return the scripts in load order. Those of panels add to the page before it starts."""
+    names = [*load_order("report", ".js")]
+    start = names.index(_START_SCRIPT)
+    names[start:start] = dict.fromkeys(
+        p.script for p in (*content.leading_panels, *content.panels) if p.script
+    )
+    return names
 
 
 def _policy_without_requests(scripts: Iterable[str]) -> str:

@@ -17,6 +17,7 @@ from mutator.report.explored_planes import ExploredPlanes
 from mutator.report.fault_path_page_data import RunFaultPaths
 from mutator.report.panel import Panel
 from mutator.report.random_searches import RandomSearch
+from mutator.report.reported_sets import ReportedSet, load_reported_sets
 from mutator.report.search_findings import SearchFindings
 from mutator.report.source_lines_with_outcomes import SourceLines
 from mutator.results.result_rows import ResultRow, rows_of
@@ -61,6 +62,7 @@ class ReportedRun:
     records: Mapping[str, Record] = field(default_factory=dict)
     # empty until they are read: a run can have thousands
     _loaded_fault_free_runs: list[tuple[FaultFreeRun, ...]] = field(default_factory=list)
+    _loaded_sets: list[tuple[ReportedSet, ...]] = field(default_factory=list)
 
     @classmethod
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
@@ -122,6 +124,13 @@ class ReportedRun:
         """The number of planned experiments that ran."""
         not_run = (Status.HARNESS_ERROR.value, Status.LEFT_OUT.value)
         return int((~self.results["status"].isin(not_run)).sum())
+
+    def defended_sets(self) -> tuple[ReportedSet, ...]:
+        """Return the sets of defences that have results; MutatorError if they cannot be compared."""
+        if not self._loaded_sets:
+            manifest = manifest_if_any(self.folder, self.workspace)
+            self._loaded_sets.append(load_reported_sets(self.folder, manifest))
+        return self._loaded_sets[0]
 
     def fault_free_runs(self) -> tuple[FaultFreeRun, ...]:
         """Return what is known of the golden runs; empty if these cannot be read."""
