@@ -97,8 +97,11 @@ def _worst_sentence(
 
 
 def _shares_sentence(best: Sequence[DefendedSet], *, is_most: bool) -> str:
-    shares = [f"`{defended.name}` prevents {prevented_share(defended)}" for defended in best]
-    return f"Of all hazards, {', '.join(shares)}{', the most' if is_most else ''}."
+    shares = {defended.name: prevented_share(defended) for defended in best}
+    if is_most:
+        by = ", and by ".join(f"`{name}`, {share}" for name, share in shares.items())
+        return f"Of all hazards, the most are prevented by {by}."
+    return f"Of all hazards, {' and '.join(f'`{name}` prevents {share}' for name, share in shares.items())}."
 
 
 def _open_sentences(sets: Iterable[DefendedSet]) -> Iterable[str]:

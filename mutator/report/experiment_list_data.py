@@ -89,7 +89,7 @@ def build_list_data(run: ReportedRun) -> ExperimentListData:
     if run.run_fault_paths:
         data["paths"] = run.run_fault_paths.page_data(ids)
     if sets := run.defended_sets():
-        data["defences"] = page_details(sets, ids)
+        data["defended"] = page_details(sets, ids)
     facts = {
         **({"defences": page_facts(sets)} if sets else {}),
         **_film_and_scene_facts(folder, workspace),

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from mutator.comparison.defended_pairs import PAIR_OUTCOME_MEANINGS
 from mutator.config.yaml_files import load_yaml
 from mutator.errors import MutatorError
 from mutator.model import Method
@@ -33,6 +34,19 @@ _PLANE_TERMS = {
     "between runs": "not driven: the driven cells around it agree",
     "validation": "some cells that the search did not drive, but calls without hazard, are drawn and driven",
     "challenger": "an error that changes, as large as a constant one that is survived",
+}
+_DEFENCE_TERMS = {
+    "defence": "a driver, an emergency brake, a limit or a monitor that acts against a hazard; it is spliced "
+    "into the controller's tree",
+    "set of defences": "the defences of one run, which repeats all experiments with them",
+    "undefended, defended run": "the run without defences, and that with a set of them",
+    "activation": "a row of steps in which a defence acts: it changes an actuator's command by more than the "
+    "tolerance",
+    "false activation": "an activation in a fault-free drive that has no hazard without defences",
+    "unneeded activation": "an activation in an experiment that has no hazard without defences",
+    "authority": "the command furthest from 0 that a defence needed",
+    "conflict": "a step in which two defences disagree about an actuator",
+    **{outcome.words: meaning for outcome, meaning in PAIR_OUTCOME_MEANINGS.items()},
 }
 _ENDING_TERMS = {
     "hazard": "a hazard occurred at or after activation",
@@ -66,6 +80,7 @@ def glossary_of(run: ReportedRun) -> Glossary:
         "How an experiment ends": _ENDING_TERMS,
         "Golden runs with a hazard": _GOLDEN_HAZARD_TERMS if run.folder.golden_hazards else {},
         "What is survived": _PLANE_TERMS if run.explored else {},
+        "Defences": _DEFENCE_TERMS if run.defended_sets() else {},
         "What is counted": _COUNTING_TERMS,
         "Alerts": _ALERT_TERMS if run.folder.has_alerts else {},
         "Hazards": {hazard.name: hazard.about for hazard in head.about_hazards if hazard.about},

@@ -7,8 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 import mutator
+from mutator.cli.app import app
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.model import Outcome
@@ -278,9 +280,54 @@ def test_the_report_begins_with_defences(places: tuple[Workspace, Path], tmp_pat
         listed = {line["experiment"] for line in csv.DictReader(file) if line["defences"] == SETS[1]}
     assert listed == hazardous | acted
     assert [*mutator.load_run(run).defended] == sorted(SETS)
+    with (tables / "defended_experiments.csv").open() as file:
+        fates = {line["experiment"]: line[f"with {SETS[0]}"] for line in csv.DictReader(file)}
+    assert fates.keys() == undefended.keys()
+    no_hazard = {name for name, record in undefended.items() if not record.hazards}
+    assert {name for name, fate in fates.items() if fate == "no hazard"} == no_hazard
+    assert "that latency, one step, here 50 ms, is part of its reaction time" in text
+    of_run = report.page.read_text()
+    assert "const Defences" in of_run and "unneeded activation</dt>" in of_run
     page = (report.page.parent / "defended" / SETS[1] / "index.html").read_text()
     changed = {name for name in hazardous if undefended[name].hazards != defended[name].hazards}
     assert changed and all(f'data-a="{name}"' in page for name in changed)
+
+
+def test_a_report_without_defences_says_nothing_of_them(
+    places: tuple[Workspace, Path], tmp_path: Path
+) -> None:
+    """Its page has no script, column, term or table of theirs."""
+    run = tmp_path / "run"
+    shutil.copytree(places[1], run, ignore=shutil.ignore_patterns("defended"))
+    report = write_report(run, places[0])
+    page = report.page.read_text()
+    assert all(word not in page for word in ("const Defences", "unneeded activation", "with_defences"))
+    assert not [*(report.page.parent / "tables").glob("defen*")]
+
+
+def test_an_experiment_says_which_defences_acted(
+    places: tuple[Workspace, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """When first, how often and with what authority; in a run without defences, nothing."""
+    monkeypatch.setenv("MUTATOR_ROOT", str(places[0].library.parent))
+
+    def show(*words: object) -> str:
+        result = CliRunner().invoke(app, ["show", *map(str, words)])
+        assert result.exit_code == 0, result.output
+        return result.output.replace("\u00a0", " ")
+
+    folder = places[1] / "defended" / SETS[0]
+    records = RunFolder.open(folder).records()
+    name, activity = next((name, record.defences[0]) for name, record in records.items() if record.defences)
+    text = show(name, "--run", folder)
+    assert f"{activity.first:.2f}" in text and "defence emergency_brake first acts" in text
+    assert f"defence emergency_brake: first acted at {activity.first:.2f} s, 1 activation, " in text
+    assert "furthest from 0, it commanded gas 0, brake 1" in text
+    assert json.loads(show(name, "--run", folder, "--json"))["defences"][0]["name"] == "emergency_brake"
+    idle = next(name for name, record in records.items() if not record.defences)
+    assert "no defence acted" in show(idle, "--run", folder)
+    assert "defence" not in show(name, "--run", places[1])
+    assert "defences" not in json.loads(show(name, "--run", places[1], "--json"))
 
 
 def test_a_defended_run_says_how_it_ended(places: tuple[Workspace, Path]) -> None:

@@ -26,8 +26,9 @@ const Defences = (() => {
     about: `A mark for each set, in this order: ${sets.map(({ name }) => name).join(", ")}. ${Object.entries(MARKS).map(([outcome, mark]) => `${mark} ${outcome}`).join(", ")}.`,
     cell: (table, row) => Dom.el("span.fates", {}, sets.map((set) => fate(table, row, set, true))),
   };
+  document.querySelector(".under-list").append(` Column "with defences": ${listed.about}`);
   Grid.COLUMNS.splice(Grid.COLUMNS.findIndex(({ name }) => name === "ending") + 1, 0, listed);
-  Rows.FACETS.push({ name: ALL, title: "With defences", between: ";" });
+  Rows.FACETS.push({ name: ALL, title: "With defences", between: ";", none: "no set" });
 
   /** The part of an opened experiment: each set with what became of it, what acted, and a link to both drives. */
   function part({ table, row }, details) {
@@ -36,12 +37,12 @@ const Defences = (() => {
     return el("section.defended", {}, el("h3", {}, "With defences"), el("div.scroll", {}, el("table.plain", {},
       el("thead", {}, el("tr", {}, ["set", "what became of it", "acted", "replay"].map((title) => el("th", { scope: "col" }, title)))),
       el("tbody", {}, sets.map((set, number) => el("tr", {}, el("th", { scope: "row" }, set.name), el("td", {}, fate(table, row, set, false)),
-        el("td", {}, details[number].words[details[number].codes[row]] || "-"), el("td", {}, link(set, number))))))));
+        el("td", {}, details[number].words[details[number].codes[row]] || "-"), el("td.replayed", {}, link(set, number))))))));
   }
 
   const place = document.getElementById("experiment");
   place.addEventListener("filled", async () => {
-    const { id, experiment } = Experiment.open, details = await Packed.read("defences");
+    const { id, experiment } = Experiment.open, details = await Packed.read("defended");
     if (Experiment.open?.id === id && !place.querySelector("section.defended")) place.querySelector("section.happened").after(part(experiment, details));
   });
 

@@ -49,9 +49,11 @@ def test_load_orders_name_every_script_once() -> None:
         "serve/start.js",
         "serve/runs.js",
         "serve/live.js",
+        "report/defences.js",  # of a panel, like the style sheets below
     }
     styles = {name for page in PAGES for name in web.load_order(page, ".css")}
     assert styles == {*web.asset_names(".css")} - {
+        "report/defences.css",
         "report/source.css",
         "serve/live.css",
     }
