@@ -11,7 +11,7 @@ from mutator.comparison.defended_sheets import prevented_share
 _Facts = TypeVar("_Facts", bound=tuple[int, ...])
 
 
-def defence_sentences(sets: Sequence[DefendedSet], step_s: float | None) -> Iterable[str]:
+def describe_sets(sets: Sequence[DefendedSet], step_s: float | None) -> Iterable[str]:
     """Say first what saves most of the worst, then what it costs, then what defences caused. `step_s`: the
     length of a step in s; None if it is not known.
     """

@@ -36,8 +36,8 @@ _PLANE_TERMS = {
     "challenger": "an error that changes, as large as a constant one that is survived",
 }
 _DEFENCE_TERMS = {
-    "defence": "a driver, an emergency brake, a limit or a monitor that acts against a hazard; it is spliced "
-    "into the controller's tree",
+    "defence": "what acts against a hazard: a safety mechanism, an external measure or a driver; it is "
+    "spliced into the controller's tree",
     "set of defences": "the defences of one run, which repeats all experiments with them",
     "undefended, defended run": "the run without defences, and that with a set of them",
     "activation": "a row of steps in which a defence acts: it changes an actuator's command by more than the "

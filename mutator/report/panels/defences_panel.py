@@ -12,7 +12,7 @@ from mutator.comparison.comparison_replays import ReportAddresses
 from mutator.comparison.defended_pairs import PairOutcome
 from mutator.comparison.defended_sets import DefendedSet
 from mutator.comparison.defended_sheets import defence_sheets
-from mutator.report.defence_sentences import defence_sentences, hazardous_pairs
+from mutator.report.defence_sentences import describe_sets, hazardous_pairs
 from mutator.report.panel import REPORT_FOLDER, Panel, rendered
 from mutator.report.panels.tables_panel import sheet_csv_and_markdown_files
 from mutator.report.reported_run import ReportedRun, manifest_if_any
@@ -61,7 +61,7 @@ def build_defences_panel(run: ReportedRun) -> Panel | None:
     sheets = defence_sheets(sets, run.folder.head.hazards)
     shown_sheets = [_shortened(sheet) for sheet in sheets if sheet.name in _SHEETS_SHOWN and sheet.lines]
     manifest = manifest_if_any(run.folder, run.workspace)
-    sentences = [*defence_sentences(sets, manifest.step_s if manifest else None)]
+    sentences = [*describe_sets(sets, manifest.step_s if manifest else None)]
     return Panel(
         anchor="defences",
         link="Defences",

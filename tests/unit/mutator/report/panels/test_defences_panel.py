@@ -9,7 +9,7 @@ from mutator.comparison.defended_pairs import DefendedPair, PairOutcome, pair_of
 from mutator.comparison.defended_sets import DefendedSet, GoldenActivity
 from mutator.comparison.defended_sheets import defence_sheets
 from mutator.model import DefenceActivity, Status
-from mutator.report.defence_sentences import defence_sentences
+from mutator.report.defence_sentences import describe_sets
 from mutator.report.panels import defences_panel
 from mutator.results.result_rows import ResultRow
 from tests.unit.mutator.comparison.test_defended_pairs import H1, OBSERVE_S, OVER, facts, row
@@ -52,7 +52,7 @@ def unchanged(**of_row: Any) -> DefendedPair:
 
 
 def text_of(*sets: DefendedSet) -> str:
-    return "\n".join(defence_sentences(sets, 0.01))
+    return "\n".join(describe_sets(sets, 0.01))
 
 
 def test_runs_that_cannot_be_compared_are_told() -> None:
@@ -137,7 +137,7 @@ def test_sets_that_tie_are_all_named() -> None:
 
 @pytest.mark.parametrize(("step_s", "length"), [(0.01, "one step, here 10 ms,"), (None, "one step,")])
 def test_the_latency_is_said(step_s: float | None, length: str) -> None:
-    *_, last = defence_sentences([set_of("a", prevented())], step_s)
+    *_, last = describe_sets([set_of("a", prevented())], step_s)
     assert f"that latency, {length} is part of its reaction time" in last
 
 
