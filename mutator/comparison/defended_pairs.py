@@ -23,17 +23,17 @@ LEAST_DELTA_V_CHANGE_MPS = 0.1  # a smaller change of a contact is none
 
 
 class PairOutcome(StrEnum):
-    """What became of an experiment's hazard with defences."""
+    """What became of an experiment's hazard with defences: `PAIR_OUTCOME_MEANINGS` says what each means."""
 
-    PREVENTED = "prevented"  # none until the end, and nothing that can still cause one
-    OPEN = "open"  # none until the end, but the drive ends too early to say more
-    REPLACED = "replaced"  # another hazard instead
-    MITIGATED = "mitigated"  # the same, less severe, even with one more hazard; or as severe, with fewer
-    UNCHANGED = "unchanged"  # the same, as severe
-    WORSENED = "worsened"  # the same, more severe; or as severe, with one more hazard
-    CAUSED = "caused"  # a hazard that the undefended run does not have
-    NO_HAZARD = "no_hazard"  # in neither run
-    NOT_COMPARED = "not_compared"  # one of the runs crashed, or is no result
+    PREVENTED = "prevented"
+    OPEN = "open"
+    REPLACED = "replaced"
+    MITIGATED = "mitigated"
+    UNCHANGED = "unchanged"
+    WORSENED = "worsened"
+    CAUSED = "caused"
+    NO_HAZARD = "no_hazard"
+    NOT_COMPARED = "not_compared"
 
     @property
     def words(self) -> str:

@@ -73,8 +73,8 @@ class DefenceModelFile:
 
 
 def load_defence_model(templates: Path, name: str, source: YamlSource) -> DefenceModelFile:
-    """Read and check the model that a defence names. MutatorError for an unknown name, for a file that cannot
-    be read or is no model, and as in `check_uses`.
+    """Read and check the model that a defence names. MutatorError if the name is unknown, if the file cannot
+    be read or is no model, or if it uses what `check_uses` refuses.
     """
     folder = templates / MODELS_FOLDER
     names = sorted(path.stem for path in folder.glob("*.py"))

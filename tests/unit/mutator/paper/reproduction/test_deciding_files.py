@@ -69,5 +69,6 @@ def test_only_a_campaign_with_defences_executes_what_reads_them(
     workspace = copy_toycar(tmp_path)
     executed = executed_modules(lambda: run_campaign(workspace, campaign, tmp_path / "run"))
     assert "mutator/campaigns/plan.py" in executed
+    assert not [name for name in executed if name.startswith("mutator/checks/")]
     unused = [name for name in executed if name.startswith(UNUSED_BY_STUDY_PATHS)]
     assert bool(unused) == (campaign == "defended"), unused
