@@ -13,6 +13,7 @@ from mutator._common.confined_files import MOST_NAME_BYTES
 from mutator._common.hashing import digest
 from mutator._common.message_text import shortened_repr, spelling_suggestion
 from mutator.config.unit_symbol_field import UnitSymbol
+from mutator.config.units import UNITS
 from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.config.yaml_source_lines import YamlSource
 from mutator.defences.defence import Defence, Kind, Parameter, Role, Sense
@@ -31,7 +32,7 @@ from mutator.triggers.conditions import (
 SCHEMA = "defence/1"
 _NO_DEFENCE = "none"  # in the sets of a campaign
 MOST_NAME_LENGTH = MOST_NAME_BYTES - len("_fd_.py")  # a copy of its model is a file of this name
-_TIME_UNITS = ("s", "ms", "us", "min")
+_TIME_UNITS = frozenset(unit.symbol for unit in UNITS.values() if unit.dimension == "time")
 _RESERVED_NAMES = (*RESERVED_NAMES, "math", "values", "senses", "is_active")
 
 
